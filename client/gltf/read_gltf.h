@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/scene/scene.h"
+
+namespace radbake::gltf {
+
+/// An image file's bytes decoded to a plane. `is_srgb`: the values are to be brought from sRGB to linear light
+/// (opacity never is). Injected, so that this library needs no image library.
+using ImageDecoder =
+    std::function<Result<TexturePlane>(std::span<const std::byte> bytes, const std::string& name, bool is_srgb)>;
+
+struct ReadOptions {
+  double max_reflectance = 0.98;  ///< glTF's default base colour is 1, and 1 does not converge
+};
+
+struct GltfScene {
+  Scene scene;                    ///< in world space: instances, transforms and mirrors are applied
+  std::vector<Warning> warnings;  ///< what was limited, dropped, or read and is not simulated, with its share of the area
+  std::uint64_t num_triangles_dropped = 0;  ///< of zero area
+};
+
+/// Reads the default scene of a .glb or .gltf file.
+///
+/// Errors: kInvalidArgument with a message that names the file and the mesh, accessor, node or value: not a glTF,
+/// truncated, missing buffer, index out of range, counts beyond the buffer, NaN or infinite position, a cycle in the
+/// node tree, no area, unknown required extension, corrupt Draco, image that does not decode.
+/// Source: glTF 2.0 specification; KHR_materials_emissive_strength, KHR_lights_punctual.
+Result<GltfScene> read_gltf(const std::filesystem::path& path, const ImageDecoder& decode_image,
+                            const ReadOptions& options);
+
+}  // namespace radbake::gltf

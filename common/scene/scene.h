@@ -1,0 +1,114 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/geometry/transform.h"
+#include "common/geometry/vector.h"
+
+namespace radbake {
+
+enum class Wrap { kRepeat, kClamp, kMirror };
+
+/// An image in linear light, float32, rows from the top (glTF's UV origin), channels interleaved.
+/// Shapes: values [height * width * channels], channels 3 or 4; the fourth is opacity.
+struct TexturePlane {
+  std::string name;
+  int width = 0;
+  int height = 0;
+  int channels = 3;
+  Wrap wrap_s = Wrap::kRepeat;
+  Wrap wrap_t = Wrap::kRepeat;
+  std::vector<float> values;
+};
+
+/// Which texture multiplies a material's factor, and which of the mesh's texture coordinates it uses.
+struct TextureReference {
+  int texture = 0;   ///< index into Scene::textures
+  int texcoord = 0;  ///< 0 or 1
+};
+
+enum class AlphaMode { kOpaque, kMask, kBlend };
+
+/// A diffuse surface. Colours are linear Rec.709.
+struct Material {
+  std::string name;
+  Vec3 reflectance{0.8, 0.8, 0.8};  ///< each channel in [0, 1)
+  std::optional<TextureReference> reflectance_texture;
+  Vec3 emissive;  ///< luminance, nit; exitance E = pi * emissive
+  std::optional<TextureReference> emissive_texture;
+  bool is_double_sided = false;
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  double alpha = 1;
+  double alpha_cutoff = 0.5;
+};
+
+/// Triangles of one material. Front is where the vertices turn counter-clockwise.
+/// Shapes: positions [n]; normals, texcoord0, texcoord1 [n] or empty; triangles [m] of indices below n.
+struct Mesh {
+  std::string name;  ///< for messages: node/mesh#primitive
+  int material = 0;
+  std::vector<Vec3> positions;  ///< metres
+  std::vector<Vec3> normals;    ///< unit length
+  std::vector<Vec2> texcoord0;
+  std::vector<Vec2> texcoord1;  ///< the lightmap's layout: (0, 0) is the top left corner of the atlas
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// Intensity in cd; no falloff but the inverse square.
+struct PointLight {
+  Vec3 position;
+  Vec3 intensity;
+};
+
+/// Full intensity (cd) inside the inner cone, smooth to zero at the outer one, as KHR_lights_punctual recommends.
+struct SpotLight {
+  Vec3 position;
+  Vec3 direction;  ///< in which the light travels, unit length
+  Vec3 intensity;
+  double inner_cone_radians = 0;
+  double outer_cone_radians = 0.7853981633974483;
+};
+
+/// The sun: parallel light, illuminance in lx on a facing surface.
+struct DirectionalLight {
+  Vec3 direction;  ///< in which the light travels, unit length
+  Vec3 illuminance;
+};
+
+struct Light {
+  std::string name;
+  std::variant<PointLight, SpotLight, DirectionalLight> kind;
+};
+
+/// What is baked: meshes in world space, their materials, and the lights. Plain data.
+struct Scene {
+  std::vector<Mesh> meshes;
+  std::vector<Material> materials;
+  std::vector<TexturePlane> textures;
+  std::vector<Light> lights;
+  Vec3 sky;  ///< luminance of a constant sky, nit; 0: none
+};
+
+/// A mesh placed in the world, as a file tells it.
+struct Instance {
+  std::string name;  ///< of the node
+  int mesh = 0;
+  Transform transform;
+};
+
+/// Copies a mesh into the world: positions, normals, and the winding where the transform mirrors.
+/// Triangles keep their order. Source: glTF 2.0, 3.7.4 (a negative determinant reverses the winding).
+Mesh placed_in_world(const Mesh& mesh, const Transform& transform);
+
+/// A message that the user should see, with a short stable id.
+struct Warning {
+  std::string id;
+  std::string text;
+};
+
+}  // namespace radbake

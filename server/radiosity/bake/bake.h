@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/scene/scene.h"
+#include "server/radiosity/plan/plan.h"
+
+namespace radbake::radiosity {
+
+enum class BakeStage { kPreparing, kFormFactors, kSolving, kGathering };
+
+struct BakeProgress {
+  BakeStage stage = BakeStage::kPreparing;
+  double fraction = 0;            ///< of the whole bake, 0..1, never decreases
+  std::uint64_t steps_done = 0;   ///< of this stage: rows, sweeps, texels
+  std::uint64_t steps_total = 0;  ///< 0: not known
+  double seconds_left = -1;       ///< estimate; negative: not known yet
+  double residual = 0;            ///< kSolving: relative error bound so far
+};
+
+/// A finished rectangle of a layer. Shapes: values [height * width * channels], rows from the top.
+struct Tile {
+  int layer = 0;
+  int pass = 0;
+  int x = 0, y = 0, width = 0, height = 0;
+  int channels = 4;
+  std::vector<float> values;
+};
+
+/// One named image. Shapes: values [height * width * channels], rows from the top.
+struct Layer {
+  std::string name;      ///< lightmap_0
+  std::string quantity;  ///< irradiance
+  std::string unit;      ///< lx
+  int width = 0, height = 0, channels = 4;
+  std::vector<float> values;
+};
+
+/// How a solve ended. Field for field radbake.v1.SolverReport, where the fields are explained.
+struct SolverSummary {
+  std::string solver;
+  std::string status;
+  int sweeps = 0;
+  double residual = 0, error_bound = 0, relative_error_bound = 0, tolerance = 0;
+};
+
+/// Field for field radbake.v1.EnergyAudit, where the fields are explained.
+struct EnergyAudit {
+  bool is_closed = false;
+  double emitted = 0, absorbed = 0, gap = 0, gap_standard_error = 0, escaped = 0;
+  double transported_relative_gap = 0, mean_irradiance = 0;
+};
+
+/// Field for field radbake.v1.TransportReport, where the fields are explained.
+struct TransportSummary {
+  std::uint64_t num_entries = 0;
+  double raw_reciprocity_rms = 0, raw_closure_max = 0, paired_row_error_rms = 0, repaired_row_error_max = 0;
+  int scaling_sweeps = 0;
+  double escape_share = 0, absorbed_share = 0;
+};
+
+/// Field for field radbake.v1.LightmapReport, where the fields are explained.
+struct LightmapSummary {
+  int atlas_size = 0;
+  std::uint64_t num_texels = 0, num_texels_filled = 0, num_texels_dilated = 0;
+  double texels_per_meter = 0;
+};
+
+struct StageTime {
+  std::string stage;
+  double seconds = 0;
+};
+
+/// What a bake did. Everything but `stages` is the same for equal bakes.
+struct BakeReport {
+  std::string instruction_set;
+  BakePlan plan;
+  std::uint64_t num_patches = 0, num_row_rays = 0, num_gather_rays = 0, num_light_rays = 0;
+  SolverSummary solver;
+  EnergyAudit energy;
+  TransportSummary transport;
+  LightmapSummary lightmap;
+  std::vector<Warning> warnings;
+  std::vector<StageTime> stages;
+};
+
+struct BakeOutcome {
+  std::vector<Layer> layers;
+  BakeReport report;
+};
+
+/// Watches a bake. Calls come from the bake's threads, one at a time; they must be quick.
+class BakeObserver {
+ public:
+  virtual ~BakeObserver() = default;
+  virtual void on_progress(const BakeProgress& progress) = 0;
+  virtual void on_tile(const Tile& tile) = 0;
+};
+
+/// Checks a scene and says what a bake of it would do: layout, patches, counts. Traces no ray.
+///
+/// Errors: kInvalidArgument names the mesh, index or material and the value.
+Result<BakePlan> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop = {});
+
+/// Bakes a scene: plan, patches, direct light, rows, solve, gather.
+///
+/// The result is a function of scene and options alone, bit for bit, for any number of threads.
+/// Units:  metres, nit, cd, lx in; irradiance in lx out.
+/// Errors: as plan_scene; kCancelled when stop was requested; kInternal when the solver did not converge.
+Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
+                               std::stop_token stop = {});
+
+}  // namespace radbake::radiosity

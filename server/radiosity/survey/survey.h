@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/scene/scene.h"
+
+namespace radbake::radiosity {
+
+/// Facts of a scene, counted before a ray is traced. Field for field radbake.v1.Survey.
+struct Survey {
+  std::uint64_t num_meshes = 0;
+  std::uint64_t num_vertices = 0;
+  std::uint64_t num_triangles = 0;          ///< that are baked
+  std::uint64_t num_triangles_dropped = 0;  ///< of zero area
+  std::uint64_t num_materials = 0;
+  std::uint64_t num_textures = 0;
+  std::uint64_t num_lights = 0;
+  std::uint64_t num_emitter_triangles = 0;  ///< lit by sampling (small and bright)
+  std::uint64_t num_glowing_triangles = 0;  ///< emit, but stay in the rows
+  double area_m2 = 0;                       ///< one side of every triangle
+  double emitted_lumens = 0;                ///< by surfaces, mean of the three channels
+  double max_reflectance = 0;
+  double extent_m = 0;  ///< longest side of the bounding box
+  bool has_sky = false;
+};
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,72 @@
+#include "common/log/log.h"
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+namespace radbake {
+namespace {
+
+/// Formats a line as text or as a JSON object. spdlog's own patterns do not escape the message.
+class LineFormatter : public spdlog::formatter {
+ public:
+  LineFormatter(std::string program, bool is_json) : program_(std::move(program)), is_json_(is_json) {}
+
+  void format(const spdlog::details::log_msg& line, spdlog::memory_buf_t& out) override {
+    const auto since_epoch = line.time.time_since_epoch();
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(since_epoch);
+    const auto millis = std::chrono::duration_cast<std::chrono::milliseconds>(since_epoch - seconds);
+    const std::time_t clock = seconds.count();
+    std::tm utc{};
+    gmtime_r(&clock, &utc);
+    const std::string time =
+        fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03}Z", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday,
+                    utc.tm_hour, utc.tm_min, utc.tm_sec, millis.count());
+    const auto level_view = spdlog::level::to_string_view(line.level);
+    const std::string level(level_view.data(), level_view.size());
+    const std::string message(line.payload.data(), line.payload.size());
+    std::string text;
+    if (is_json_) {
+      const nlohmann::ordered_json object = {
+          {"time", time}, {"level", level}, {"program", program_}, {"pid", getpid()}, {"message", message}};
+      text = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    } else {
+      text = fmt::format("{} {} {}: {}\n", time, level, program_, message);
+    }
+    out.append(text.data(), text.data() + text.size());
+  }
+
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<LineFormatter>(program_, is_json_);
+  }
+
+ private:
+  std::string program_;
+  bool is_json_;
+};
+
+}  // namespace
+
+Result<void> set_up_log(const LogOptions& options) {
+  // from_str answers "off" for what it does not know.
+  const spdlog::level::level_enum level = spdlog::level::from_str(options.level);
+  if (level == spdlog::level::off && options.level != "off") {
+    return invalid_argument("log level '" + options.level + "' is none of trace, debug, info, warning, error, off");
+  }
+  try {
+    auto logger = std::make_shared<spdlog::logger>(options.program, std::make_shared<spdlog::sinks::stderr_sink_mt>());
+    logger->set_formatter(std::make_unique<LineFormatter>(options.program, options.is_json));
+    logger->set_level(level);
+    logger->flush_on(spdlog::level::trace);
+    spdlog::set_default_logger(std::move(logger));
+  } catch (const std::exception& problem) {
+    return internal_error(std::string("log: ") + problem.what());
+  }
+  return {};
+}
+
+}  // namespace radbake

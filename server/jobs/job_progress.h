@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+
+#include "server/store/job_record.h"
+
+namespace radbake::jobs {
+
+/// How far a running job is, as its worker tells. Field for field radbake.v1.Progress.
+struct JobProgress {
+  store::JobState state = store::JobState::kPreparing;
+  double fraction = 0;
+  std::uint64_t steps_done = 0;
+  std::uint64_t steps_total = 0;
+  double seconds_left = -1;
+  double residual = 0;
+};
+
+}  // namespace radbake::jobs

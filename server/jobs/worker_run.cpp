@@ -1,0 +1,199 @@
+#include "server/jobs/worker_run.h"
+
+#include <sys/socket.h>
+
+#include <utility>
+
+#include "common/base/version.h"
+
+namespace radbake::jobs {
+namespace {
+
+std::string in_seconds(std::chrono::duration<double> duration) {
+  std::string text = std::to_string(duration.count());
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text + " s";
+}
+
+}  // namespace
+
+WorkerRun::WorkerRun(Assignment assignment, const WorkerOptions& options, store::ContentStore& content,
+                     RunEvents events)
+    : assignment_(std::move(assignment)), options_(options), content_(content), events_(std::move(events)) {}
+
+Result<void> WorkerRun::start(WorkerGate& gate) {
+  // Open every input now: from here on the worker needs no file system.
+  std::vector<store::FileDescriptor> files;
+  std::vector<int> inherited;
+  WorkOrder order{assignment_.is_plan, assignment_.work, {}};
+  for (const Digest& digest : assignment_.work.inputs) {
+    RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(digest));
+    order.inputs.push_back({digest, file.get()});
+    inherited.push_back(file.get());
+    files.push_back(std::move(file));
+  }
+  int ends[2];
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0) {
+    return store::system_error("cannot create a socket for a worker");
+  }
+  store::FileDescriptor ours(ends[0]), theirs(ends[1]);
+  inherited.push_back(theirs.get());
+
+  std::vector<std::string> arguments = {"--fd",      std::to_string(theirs.get()),       "--job", assignment_.job,
+                                        "--attempt", std::to_string(assignment_.attempt)};
+  if (options_.log_json) arguments.push_back("--log-json");
+  {
+    const std::lock_guard lock(mutex_);
+    order_ = std::move(order);
+    started_at_ = last_heard_at_ = Clock::now();
+    auto process = WorkerProcess::start(options_.program, arguments, inherited, options_.limits, events_.on_exit);
+    if (!process.ok()) return process.error();
+    process_ = std::move(process).value();
+  }
+  gate.adopt(std::move(ours));
+  return {};
+}
+
+Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link) {
+  const std::lock_guard lock(mutex_);
+  if (hello.attempt != assignment_.attempt || link_) {
+    return Error{ErrorCode::kFailedPrecondition, assignment_.job + " is at attempt " +
+                                                     std::to_string(assignment_.attempt) +
+                                                     (link_ ? " and has its worker" : "") + ": attempt " +
+                                                     std::to_string(hello.attempt) + " is refused"};
+  }
+  // A worker of another build may bake other bytes under the same bake key.
+  if (hello.protocol_major != kProtocolMajor || hello.engine_version != kEngineVersion) {
+    kill_reason_ = "is version " + hello.engine_version + " with protocol " + std::to_string(hello.protocol_major) +
+                   ", the server is version " + kEngineVersion + " with protocol " + std::to_string(kProtocolMajor);
+    process_->kill_group();
+    return Error{ErrorCode::kFailedPrecondition, "the worker " + kill_reason_};
+  }
+  last_heard_at_ = Clock::now();
+  link_ = std::move(link);
+  link_->start(order_);
+  if (cancel_requested_at_) link_->cancel();
+  return {};
+}
+
+void WorkerRun::report_progress(const JobProgress& progress) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_heard_at_ = Clock::now();
+    if (has_outcome_) return;
+  }
+  events_.on_progress(progress);
+}
+
+void WorkerRun::report_tile(const std::string& tile) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_heard_at_ = Clock::now();
+    if (has_outcome_) return;
+  }
+  events_.on_tile(tile);
+}
+
+Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_heard_at_ = Clock::now();
+  }
+  if (!blob_.writer) {
+    RADBAKE_ASSIGN_OR_RETURN(blob_.writer, content_.new_blob());
+    blob_.name = chunk.blob;
+  }
+  if (chunk.blob != blob_.name || chunk.offset != blob_.writer->size()) {
+    return invalid_argument("the worker sent part " + std::to_string(chunk.offset) + " of result blob '" + chunk.blob +
+                            "' after " + std::to_string(blob_.writer->size()) + " bytes of '" + blob_.name + "'");
+  }
+  RADBAKE_RETURN_IF_ERROR(blob_.writer->append(std::as_bytes(std::span(chunk.bytes))));
+  if (!chunk.digest) return {};
+  auto committed = content_.commit(*blob_.writer, *chunk.digest);
+  blob_.writer.reset();
+  // Forcing a large blob to the disk takes a while in which the worker was not heard.
+  const std::lock_guard lock(mutex_);
+  last_heard_at_ = Clock::now();
+  return committed;
+}
+
+void WorkerRun::report_outcome(WorkOutcome outcome, const std::vector<Digest>& blobs) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_heard_at_ = Clock::now();
+    if (std::exchange(has_outcome_, true)) return;
+  }
+  const std::vector<Digest> missing = content_.find_missing(blobs);
+  if (!missing.empty()) {
+    outcome = {WorkOutcome::Kind::kFailed, "",
+               internal_error("the worker's result names blob " + missing.front().sha256 + ", which it never sent")};
+  }
+  events_.on_outcome(std::move(outcome));
+}
+
+void WorkerRun::report_disconnected() {
+  const std::lock_guard lock(mutex_);
+  if (!disconnected_at_) disconnected_at_ = Clock::now();
+}
+
+void WorkerRun::request_cancel() {
+  const std::lock_guard lock(mutex_);
+  if (cancel_requested_at_) return;
+  cancel_requested_at_ = Clock::now();
+  if (link_) link_->cancel();
+}
+
+bool WorkerRun::is_cancel_requested() const {
+  const std::lock_guard lock(mutex_);
+  return cancel_requested_at_.has_value();
+}
+
+void WorkerRun::accept() {
+  const std::lock_guard lock(mutex_);
+  accepted_at_ = Clock::now();
+  if (link_) link_->accept();
+}
+
+void WorkerRun::kill(const std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  if (kill_reason_.empty()) kill_reason_ = reason;
+  if (process_) process_->kill_group();
+}
+
+std::optional<std::string> WorkerRun::overstepped_limit(Clock::time_point now) const {
+  if (accepted_at_) {
+    if (now - *accepted_at_ <= options_.exit_grace) return std::nullopt;
+    return "did not exit within " + in_seconds(options_.exit_grace) + " of its end";
+  }
+  if (cancel_requested_at_ && now - *cancel_requested_at_ > options_.cancel_grace) {
+    return "did not stop within " + in_seconds(options_.cancel_grace) + " of being asked";
+  }
+  if (has_outcome_) return std::nullopt;  // the queue is storing it
+  if (assignment_.time_limit && now - started_at_ > *assignment_.time_limit) {
+    return "took longer than its limit of " + in_seconds(*assignment_.time_limit);
+  }
+  if (disconnected_at_ && now - *disconnected_at_ > options_.disconnect_grace) {
+    return std::string("closed its connection without a result");
+  }
+  if (now - last_heard_at_ > options_.silence_limit) {
+    return "gave no sign of life for " + in_seconds(options_.silence_limit);
+  }
+  return std::nullopt;
+}
+
+void WorkerRun::check(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (!process_ || !kill_reason_.empty()) return;
+  const std::optional<std::string> reason = overstepped_limit(now);
+  if (!reason) return;
+  kill_reason_ = *reason;
+  process_->kill_group();
+}
+
+std::string WorkerRun::kill_reason() const {
+  const std::lock_guard lock(mutex_);
+  return kill_reason_;
+}
+
+}  // namespace radbake::jobs

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/jobs/job_progress.h"
+#include "server/jobs/worker_link.h"
+#include "server/jobs/worker_process.h"
+#include "server/store/content_store.h"
+
+namespace radbake::jobs {
+
+/// How workers are started and how long they are waited for.
+struct WorkerOptions {
+  std::filesystem::path program;
+  bool log_json = false;
+  ProcessLimits limits;
+  std::chrono::milliseconds silence_limit{10'000};    ///< without any report
+  std::chrono::milliseconds cancel_grace{5'000};      ///< from the request to cancel to the kill
+  std::chrono::milliseconds exit_grace{5'000};        ///< from the accepted outcome to the kill
+  std::chrono::milliseconds disconnect_grace{2'000};  ///< from a lost connection to the kill
+};
+
+/// What a run tells its queue. Calls come from any thread and must be quick.
+struct RunEvents {
+  std::function<void(const JobProgress&)> on_progress;
+  std::function<void(const std::string& tile)> on_tile;
+  std::function<void(WorkOutcome)> on_outcome;     ///< at most once
+  std::function<void(const WorkerExit&)> on_exit;  ///< once after start() succeeded, last
+};
+
+/// One attempt at a job, or one plan: a worker's process and what it reports. Thread-safe.
+class WorkerRun {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  struct Assignment {
+    std::string job;
+    std::uint32_t attempt = 1;
+    bool is_plan = false;
+    store::Work work;
+    std::optional<Clock::duration> time_limit;
+  };
+
+  WorkerRun(Assignment assignment, const WorkerOptions& options, store::ContentStore& content, RunEvents events);
+
+  /// Opens the inputs, starts the process and gives the server's end of its socket to the gate.
+  Result<void> start(WorkerGate& gate);
+
+  // What the worker reports.
+  /// Checks that this is the worker that was started for this attempt, and gives it its work.
+  Result<void> greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link);
+  void report_progress(const JobProgress& progress);
+  void report_tile(const std::string& tile);
+  Result<void> report_chunk(const ResultChunk& chunk);
+  /// Blobs that a result names must be stored: an outcome that names others is a failure.
+  void report_outcome(WorkOutcome outcome, const std::vector<Digest>& blobs);
+  void report_disconnected();
+
+  // What the queue decides.
+  void request_cancel();
+  bool is_cancel_requested() const;
+  void accept();
+  void kill(const std::string& reason);
+  /// Kills the worker when it has overstepped one of its limits.
+  void check(Clock::time_point now);
+
+  /// Why the queue or check() killed it; empty if nobody did.
+  std::string kill_reason() const;
+  const Assignment& assignment() const { return assignment_; }
+
+ private:
+  struct GrowingBlob {
+    std::string name;
+    std::unique_ptr<store::BlobWriter> writer;
+  };
+
+  std::optional<std::string> overstepped_limit(Clock::time_point now) const;
+
+  const Assignment assignment_;
+  const WorkerOptions options_;
+  store::ContentStore& content_;
+  const RunEvents events_;
+
+  mutable std::mutex mutex_;  // guards what follows, down to process_
+  WorkOrder order_;
+  std::shared_ptr<WorkerLink> link_;
+  Clock::time_point started_at_;
+  Clock::time_point last_heard_at_;
+  std::optional<Clock::time_point> cancel_requested_at_;
+  std::optional<Clock::time_point> accepted_at_;
+  std::optional<Clock::time_point> disconnected_at_;
+  bool has_outcome_ = false;
+  std::string kill_reason_;
+  GrowingBlob blob_;  // one after the other; touched by the worker's reports only
+
+  std::unique_ptr<WorkerProcess> process_;  // set once, by start(), under mutex_
+};
+
+}  // namespace radbake::jobs

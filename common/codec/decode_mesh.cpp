@@ -1,0 +1,186 @@
+#include <draco/compression/decode.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <memory>
+#include <new>
+
+#include "common/codec/draco_peek.h"
+#include "common/codec/mesh_codec.h"
+
+namespace radbake {
+namespace {
+
+using Type = draco::GeometryAttribute;
+
+// One for each attribute beside the position: vertex id, normal, two texture coordinates.
+constexpr unsigned kMaxConnectivities = 4;
+
+std::string in_words(std::uint64_t found, const char* what, std::uint64_t declared) {
+  return "has " + std::to_string(found) + " " + what + ", its record says " + std::to_string(declared);
+}
+
+/// Holds what a blob claims against its record, before memory is taken for it.
+Result<void> check_claims(const std::string& blob, const v1::MeshRecord& record) {
+  RADBAKE_ASSIGN_OR_RETURN(const DracoClaims claims, peek_draco(blob));
+  if (claims.num_faces != record.num_triangles()) {
+    return invalid_argument(in_words(claims.num_faces, "triangles", record.num_triangles()));
+  }
+  // Points split where the surface is not manifold, at most to one for each corner.
+  const std::uint64_t num_corners = 3 * std::uint64_t{record.num_triangles()};
+  if (claims.num_points > num_corners || claims.num_split_symbols > claims.num_faces) {
+    return invalid_argument("has " + std::to_string(claims.num_points) + " points and " +
+                            std::to_string(claims.num_split_symbols) + " splits for " + std::to_string(num_corners) +
+                            " corners");
+  }
+  if (claims.num_connectivities > kMaxConnectivities) {
+    return invalid_argument("has " + std::to_string(claims.num_connectivities) + " attribute connectivities, at most " +
+                            std::to_string(kMaxConnectivities) + " are allowed");
+  }
+  return {};
+}
+
+Result<std::unique_ptr<draco::Mesh>> decode(const std::string& blob) {
+  try {
+    draco::DecoderBuffer buffer;
+    buffer.Init(blob.data(), blob.size());
+    auto decoded = draco::Decoder().DecodeMeshFromBuffer(&buffer);
+    if (!decoded.ok()) return invalid_argument("does not decode: " + decoded.status().error_msg_string());
+    return std::move(decoded).value();
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kResourceExhausted, "needs more memory to decode than there is"};
+  } catch (const std::exception& exception) {
+    return invalid_argument(std::string("does not decode: ") + exception.what());
+  }
+}
+
+/// The attribute of an id, of exactly this kind and with a value for every point.
+Result<const draco::PointAttribute*> attribute_of(const draco::Mesh& decoded, std::uint32_t unique_id, Type::Type type,
+                                                  draco::DataType data_type, int num_components, const char* name) {
+  const draco::PointAttribute* attribute = decoded.GetAttributeByUniqueId(unique_id);
+  if (attribute == nullptr || attribute->attribute_type() != type || attribute->data_type() != data_type ||
+      attribute->num_components() != num_components) {
+    return invalid_argument(std::string("has no attribute ") + name + " of the right type");
+  }
+  for (std::uint32_t point = 0; point < decoded.num_points(); ++point) {
+    if (attribute->mapped_index(draco::PointIndex(point)).value() >= attribute->size()) {
+      return invalid_argument(std::string("has no ") + name + " for point " + std::to_string(point));
+    }
+  }
+  return attribute;
+}
+
+/// Reads float attributes into a vertex array; absent ones leave it empty.
+struct FloatAttribute {
+  const draco::PointAttribute* attribute = nullptr;
+  const char* name = "";
+
+  /// The value of a point; z is 0 where the attribute has two components.
+  Result<Vec3> at(std::uint32_t point) const {
+    float value[3] = {0, 0, 0};
+    attribute->GetMappedValue(draco::PointIndex(point), value);
+    const Vec3 result{value[0], value[1], value[2]};
+    if (!is_finite(result)) return invalid_argument(std::string("has a ") + name + " that is not finite");
+    return result;
+  }
+};
+
+Result<FloatAttribute> float_attribute(const draco::Mesh& decoded, bool is_declared, std::uint32_t id, Type::Type type,
+                                       int num_components, const char* name) {
+  if (!is_declared) return FloatAttribute{};
+  RADBAKE_ASSIGN_OR_RETURN(const auto* attribute,
+                           attribute_of(decoded, id, type, draco::DT_FLOAT32, num_components, name));
+  return FloatAttribute{attribute, name};
+}
+
+Result<Mesh> read(const draco::Mesh& decoded, const v1::MeshRecord& record, Vec3 origin) {
+  // Check counts and attributes.
+  if (decoded.num_faces() != record.num_triangles()) {
+    return invalid_argument(in_words(decoded.num_faces(), "triangles after decoding", record.num_triangles()));
+  }
+  const int num_attributes = 2 + record.has_normals() + record.has_texcoord0() + record.has_texcoord1();
+  if (decoded.num_attributes() != num_attributes) {
+    return invalid_argument(in_words(decoded.num_attributes(), "attributes", num_attributes));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const auto* ids,
+                           attribute_of(decoded, kVertexId, Type::GENERIC, draco::DT_UINT32, 1, "vertex id"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto position,
+                           float_attribute(decoded, true, kPositionId, Type::POSITION, 3, "position"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto normal,
+                           float_attribute(decoded, record.has_normals(), kNormalId, Type::NORMAL, 3, "normal"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto texcoord0, float_attribute(decoded, record.has_texcoord0(), kTexcoord0Id,
+                                                                 Type::TEX_COORD, 2, "texcoord 0"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto texcoord1, float_attribute(decoded, record.has_texcoord1(), kTexcoord1Id,
+                                                                 Type::TEX_COORD, 2, "texcoord 1"));
+
+  // Put every point back to its vertex.
+  const std::uint32_t num_vertices = record.num_vertices();
+  Mesh mesh;
+  mesh.name = record.name();
+  mesh.material = static_cast<int>(record.material());
+  mesh.positions.assign(num_vertices, origin);
+  if (normal.attribute) mesh.normals.assign(num_vertices, Vec3{0, 0, 1});
+  if (texcoord0.attribute) mesh.texcoord0.resize(num_vertices);
+  if (texcoord1.attribute) mesh.texcoord1.resize(num_vertices);
+  std::vector<std::uint32_t> vertex_of(decoded.num_points());
+  for (std::uint32_t point = 0; point < decoded.num_points(); ++point) {
+    std::uint32_t vertex = 0;
+    ids->GetMappedValue(draco::PointIndex(point), &vertex);
+    if (vertex >= num_vertices) {
+      return invalid_argument("has vertex id " + std::to_string(vertex) + " of " + std::to_string(num_vertices) +
+                              " vertices");
+    }
+    vertex_of[point] = vertex;
+    RADBAKE_ASSIGN_OR_RETURN(const Vec3 p, position.at(point));
+    mesh.positions[vertex] = origin + p;
+    if (normal.attribute) {
+      RADBAKE_ASSIGN_OR_RETURN(const Vec3 n, normal.at(point));
+      if (!(length(n) > 0)) return invalid_argument("has a normal of length 0 at vertex " + std::to_string(vertex));
+      mesh.normals[vertex] = normalized(n);
+    }
+    if (texcoord0.attribute) {
+      RADBAKE_ASSIGN_OR_RETURN(const Vec3 t, texcoord0.at(point));
+      mesh.texcoord0[vertex] = {t.x, t.y};
+    }
+    if (texcoord1.attribute) {
+      RADBAKE_ASSIGN_OR_RETURN(const Vec3 t, texcoord1.at(point));
+      mesh.texcoord1[vertex] = {t.x, t.y};
+    }
+  }
+
+  // Bring the triangles into the order that depends on the ids alone.
+  Triangles triangles(decoded.num_faces());
+  for (std::uint32_t face = 0; face < decoded.num_faces(); ++face) {
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t point = decoded.face(draco::FaceIndex(face))[corner].value();
+      if (point >= decoded.num_points()) {
+        return invalid_argument("has point " + std::to_string(point) + " of " + std::to_string(decoded.num_points()) +
+                                " in triangle " + std::to_string(face));
+      }
+      triangles[face][corner] = vertex_of[point];
+    }
+  }
+  mesh.triangles = canonical_triangles(triangles);
+  if (mesh.triangles.size() != triangles.size()) {
+    return invalid_argument("has " + std::to_string(triangles.size() - mesh.triangles.size()) +
+                            " triangles that use a vertex twice");
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Result<Mesh> decode_mesh(const std::string& blob, const v1::MeshRecord& record, Vec3 origin) {
+  const auto named = [&](const Error& error) {
+    return Error{error.code, "mesh '" + record.name() + "' " + error.message};
+  };
+  if (auto checked = check_claims(blob, record); !checked.ok()) return named(checked.error());
+  auto decoded = decode(blob);
+  if (!decoded.ok()) return named(decoded.error());
+  auto mesh = read(**decoded, record, origin);
+  if (!mesh.ok()) return named(mesh.error());
+  return mesh;
+}
+
+}  // namespace radbake

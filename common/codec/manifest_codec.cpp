@@ -1,0 +1,198 @@
+#include "common/codec/manifest_codec.h"
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <type_traits>
+
+namespace radbake {
+namespace {
+
+// A direction may have been rounded to float32: relative 6e-8 a component, and to spare.
+constexpr double kUnitLengthTolerance = 1e-6;
+
+std::string describe(double value) {
+  std::ostringstream out;
+  out.precision(9);
+  out << value;
+  return out.str();
+}
+
+std::string describe(Vec3 v) { return "(" + describe(v.x) + ", " + describe(v.y) + ", " + describe(v.z) + ")"; }
+
+Vec3 to_vec(const v1::Rgb& rgb) { return {rgb.r(), rgb.g(), rgb.b()}; }
+Vec3 to_vec(const v1::Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
+/// A colour of light: finite and not negative. `owner` and `what` are for the message.
+Result<Vec3> read_light_color(const v1::Rgb& rgb, const std::string& owner, const char* what) {
+  const Vec3 color = to_vec(rgb);
+  if (is_finite(color) && min_component(color) >= 0) return color;
+  return invalid_argument(owner + " has " + what + " " + describe(color) + ": must be finite and not negative");
+}
+
+Result<Vec3> read_position(const v1::Vector3& vector, const std::string& owner) {
+  const Vec3 position = to_vec(vector);
+  if (is_finite(position)) return position;
+  return invalid_argument(owner + " has position " + describe(position) + ": must be finite");
+}
+
+Result<Vec3> read_direction(const v1::Vector3& vector, const std::string& owner) {
+  const Vec3 direction = to_vec(vector);
+  if (std::abs(length(direction) - 1) <= kUnitLengthTolerance) return direction;
+  return invalid_argument(owner + " has direction " + describe(direction) + ": must be of length 1");
+}
+
+void write_reference(const std::optional<TextureReference>& reference, auto mutable_reference) {
+  if (!reference) return;
+  v1::TextureReference* out = mutable_reference();
+  out->set_texture(static_cast<std::uint32_t>(reference->texture));
+  out->set_texcoord(static_cast<std::uint32_t>(reference->texcoord));
+}
+
+Result<TextureReference> read_reference(const v1::TextureReference& reference, int num_textures,
+                                        const std::string& owner) {
+  if (reference.texture() >= static_cast<std::uint32_t>(num_textures)) {
+    return invalid_argument(owner + " uses texture " + std::to_string(reference.texture()) + " of " +
+                            std::to_string(num_textures));
+  }
+  if (reference.texcoord() > 1) {
+    return invalid_argument(owner + " uses texcoord " + std::to_string(reference.texcoord()) + ": there are 0 and 1");
+  }
+  return TextureReference{static_cast<int>(reference.texture()), static_cast<int>(reference.texcoord())};
+}
+
+}  // namespace
+
+v1::Rgb rgb_to_proto(Vec3 color) {
+  v1::Rgb out;
+  out.set_r(color.x);
+  out.set_g(color.y);
+  out.set_b(color.z);
+  return out;
+}
+
+v1::Vector3 vector_to_proto(Vec3 v) {
+  v1::Vector3 out;
+  out.set_x(v.x);
+  out.set_y(v.y);
+  out.set_z(v.z);
+  return out;
+}
+
+v1::Material to_proto(const Material& material) {
+  v1::Material out;
+  out.set_name(material.name);
+  *out.mutable_reflectance() = rgb_to_proto(material.reflectance);
+  write_reference(material.reflectance_texture, [&] { return out.mutable_reflectance_texture(); });
+  *out.mutable_emissive() = rgb_to_proto(material.emissive);
+  write_reference(material.emissive_texture, [&] { return out.mutable_emissive_texture(); });
+  out.set_double_sided(material.is_double_sided);
+  // The enumerators have the same order.
+  out.set_alpha_mode(static_cast<v1::AlphaMode>(material.alpha_mode));
+  out.set_alpha(material.alpha);
+  out.set_alpha_cutoff(material.alpha_cutoff);
+  return out;
+}
+
+v1::Light to_proto(const Light& light) {
+  v1::Light out;
+  out.set_name(light.name);
+  std::visit(
+      [&](const auto& kind) {
+        using Kind = std::decay_t<decltype(kind)>;
+        if constexpr (std::is_same_v<Kind, PointLight>) {
+          *out.mutable_point()->mutable_position() = vector_to_proto(kind.position);
+          *out.mutable_point()->mutable_intensity() = rgb_to_proto(kind.intensity);
+        } else if constexpr (std::is_same_v<Kind, SpotLight>) {
+          *out.mutable_spot()->mutable_position() = vector_to_proto(kind.position);
+          *out.mutable_spot()->mutable_direction() = vector_to_proto(kind.direction);
+          *out.mutable_spot()->mutable_intensity() = rgb_to_proto(kind.intensity);
+          out.mutable_spot()->set_inner_cone_radians(kind.inner_cone_radians);
+          out.mutable_spot()->set_outer_cone_radians(kind.outer_cone_radians);
+        } else {
+          *out.mutable_directional()->mutable_direction() = vector_to_proto(kind.direction);
+          *out.mutable_directional()->mutable_illuminance() = rgb_to_proto(kind.illuminance);
+        }
+      },
+      light.kind);
+  return out;
+}
+
+Result<Material> read_material(const v1::Material& material, int num_textures) {
+  const std::string owner = "material '" + material.name() + "'";
+  Material out;
+  out.name = material.name();
+  out.reflectance = to_vec(material.reflectance());
+  if (!is_finite(out.reflectance) || min_component(out.reflectance) < 0 || max_component(out.reflectance) >= 1) {
+    return invalid_argument(owner + " has reflectance " + describe(out.reflectance) +
+                            ": each channel must be at least 0 and below 1");
+  }
+  RADBAKE_ASSIGN_OR_RETURN(out.emissive, read_light_color(material.emissive(), owner, "emission"));
+  if (material.has_reflectance_texture()) {
+    RADBAKE_ASSIGN_OR_RETURN(out.reflectance_texture,
+                             read_reference(material.reflectance_texture(), num_textures, owner));
+  }
+  if (material.has_emissive_texture()) {
+    RADBAKE_ASSIGN_OR_RETURN(out.emissive_texture, read_reference(material.emissive_texture(), num_textures, owner));
+  }
+  out.is_double_sided = material.double_sided();
+  if (!v1::AlphaMode_IsValid(material.alpha_mode())) {
+    return invalid_argument(owner + " has alpha mode " + std::to_string(material.alpha_mode()) + ": not known");
+  }
+  out.alpha_mode = static_cast<AlphaMode>(material.alpha_mode());
+  out.alpha = material.alpha();
+  if (!(out.alpha >= 0 && out.alpha <= 1)) {
+    return invalid_argument(owner + " has alpha " + describe(out.alpha) + ": must be from 0 to 1");
+  }
+  out.alpha_cutoff = material.alpha_cutoff();
+  if (!(out.alpha_cutoff >= 0 && std::isfinite(out.alpha_cutoff))) {
+    return invalid_argument(owner + " has alpha cutoff " + describe(out.alpha_cutoff) +
+                            ": must be finite and not negative");
+  }
+  return out;
+}
+
+Result<Light> read_light(const v1::Light& light) {
+  const std::string owner = "light '" + light.name() + "'";
+  Light out;
+  out.name = light.name();
+  if (light.has_point()) {
+    PointLight point;
+    RADBAKE_ASSIGN_OR_RETURN(point.position, read_position(light.point().position(), owner));
+    RADBAKE_ASSIGN_OR_RETURN(point.intensity, read_light_color(light.point().intensity(), owner, "intensity"));
+    out.kind = point;
+  } else if (light.has_spot()) {
+    SpotLight spot;
+    RADBAKE_ASSIGN_OR_RETURN(spot.position, read_position(light.spot().position(), owner));
+    RADBAKE_ASSIGN_OR_RETURN(spot.direction, read_direction(light.spot().direction(), owner));
+    RADBAKE_ASSIGN_OR_RETURN(spot.intensity, read_light_color(light.spot().intensity(), owner, "intensity"));
+    spot.inner_cone_radians = light.spot().inner_cone_radians();
+    spot.outer_cone_radians = light.spot().outer_cone_radians();
+    if (!(spot.inner_cone_radians >= 0 && spot.inner_cone_radians <= spot.outer_cone_radians &&
+          spot.outer_cone_radians <= std::numbers::pi / 2)) {
+      return invalid_argument(owner + " has cones of " + describe(spot.inner_cone_radians) + " and " +
+                              describe(spot.outer_cone_radians) +
+                              " rad: must be 0 <= inner cone <= outer cone <= pi/2");
+    }
+    out.kind = spot;
+  } else if (light.has_directional()) {
+    DirectionalLight sun;
+    RADBAKE_ASSIGN_OR_RETURN(sun.direction, read_direction(light.directional().direction(), owner));
+    RADBAKE_ASSIGN_OR_RETURN(sun.illuminance,
+                             read_light_color(light.directional().illuminance(), owner, "illuminance"));
+    out.kind = sun;
+  } else {
+    return invalid_argument(owner + " is of no kind that this version knows");
+  }
+  return out;
+}
+
+Result<Vec3> read_sky(const v1::SceneManifest& manifest) {
+  return read_light_color(manifest.sky(), "the sky", "luminance");
+}
+
+Result<Vec3> read_origin(const v1::SceneManifest& manifest) { return read_position(manifest.origin(), "the origin"); }
+
+}  // namespace radbake

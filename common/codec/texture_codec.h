@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "common/base/result.h"
+#include "common/scene/scene.h"
+#include "radbake/v1/scene.pb.h"
+
+namespace radbake {
+
+/// The blob of a texture: its values as they lie in memory.
+///
+/// Errors: kInvalidArgument when the number of values is not width * height * channels.
+Result<std::string> encode_texture(const TexturePlane& plane);
+
+/// A texture's record but for the digest.
+v1::Texture to_proto(const TexturePlane& plane);
+
+/// Checks what a record declares: a size within the limit of pixels, 3 or 4 channels, and a blob of just that size.
+Result<void> check_texture(const v1::Texture& texture, std::uint64_t max_pixels);
+
+/// Reads a blob whose record was checked. Values must be finite and not negative.
+Result<TexturePlane> decode_texture(const std::string& blob, const v1::Texture& texture);
+
+}  // namespace radbake

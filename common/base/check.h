@@ -19,17 +19,17 @@ std::string describe_values(const A& a, const B& b) {
 }  // namespace radbake
 
 /// Aborts with the values of both sides when a precondition that only a programmer can break does not hold.
-#define RADBAKE_CHECK(condition)                                                              \
-  do {                                                                                        \
-    if (!(condition)) ::radbake::check_failed(__FILE__, __LINE__, #condition, "");            \
+#define RADBAKE_CHECK(condition)                                                   \
+  do {                                                                             \
+    if (!(condition)) ::radbake::check_failed(__FILE__, __LINE__, #condition, ""); \
   } while (false)
-#define RADBAKE_CHECK_OP(a, op, b)                                                            \
-  do {                                                                                        \
-    const auto& radbake_a = (a);                                                              \
-    const auto& radbake_b = (b);                                                              \
-    if (!(radbake_a op radbake_b))                                                            \
-      ::radbake::check_failed(__FILE__, __LINE__, #a " " #op " " #b,                          \
-                              ::radbake::describe_values(radbake_a, radbake_b));              \
+#define RADBAKE_CHECK_OP(a, op, b)                                               \
+  do {                                                                           \
+    const auto& radbake_a = (a);                                                 \
+    const auto& radbake_b = (b);                                                 \
+    if (!(radbake_a op radbake_b))                                               \
+      ::radbake::check_failed(__FILE__, __LINE__, #a " " #op " " #b,             \
+                              ::radbake::describe_values(radbake_a, radbake_b)); \
   } while (false)
 #define RADBAKE_CHECK_EQ(a, b) RADBAKE_CHECK_OP(a, ==, b)
 #define RADBAKE_CHECK_LT(a, b) RADBAKE_CHECK_OP(a, <, b)

@@ -47,9 +47,8 @@ Digest digest_of(std::span<const std::byte> bytes) {
 Digest digest_of(const std::string& bytes) { return digest_of(std::as_bytes(std::span(bytes))); }
 
 Result<void> validate_sha256(const std::string& sha256) {
-  const bool is_hex = std::all_of(sha256.begin(), sha256.end(), [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-  });
+  const bool is_hex = std::all_of(sha256.begin(), sha256.end(),
+                                  [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
   if (sha256.size() == 64 && is_hex) return {};
   return invalid_argument("'" + sha256.substr(0, 80) + "' is not a SHA-256 digest (64 lower-case hexadecimal digits)");
 }

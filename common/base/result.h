@@ -77,19 +77,19 @@ class [[nodiscard]] Result<void> {
 }  // namespace radbake
 
 /// Returns the error of a Result from the enclosing function, if it holds one.
-#define RADBAKE_RETURN_IF_ERROR(expression)                                   \
-  do {                                                                        \
-    if (auto radbake_status = (expression); !radbake_status.ok()) {           \
-      return radbake_status.error();                                          \
-    }                                                                         \
+#define RADBAKE_RETURN_IF_ERROR(expression)                         \
+  do {                                                              \
+    if (auto radbake_status = (expression); !radbake_status.ok()) { \
+      return radbake_status.error();                                \
+    }                                                               \
   } while (false)
 
 /// Declares `variable` with the value of a Result, or returns its error from the enclosing function.
-#define RADBAKE_ASSIGN_OR_RETURN(variable, expression)                        \
+#define RADBAKE_ASSIGN_OR_RETURN(variable, expression) \
   RADBAKE_ASSIGN_OR_RETURN_IMPL(RADBAKE_CONCAT(radbake_result_, __LINE__), variable, expression)
-#define RADBAKE_ASSIGN_OR_RETURN_IMPL(result, variable, expression)           \
-  auto result = (expression);                                                 \
-  if (!result.ok()) return result.error();                                    \
+#define RADBAKE_ASSIGN_OR_RETURN_IMPL(result, variable, expression) \
+  auto result = (expression);                                       \
+  if (!result.ok()) return result.error();                          \
   variable = std::move(result).value()
 #define RADBAKE_CONCAT(a, b) RADBAKE_CONCAT_IMPL(a, b)
 #define RADBAKE_CONCAT_IMPL(a, b) a##b

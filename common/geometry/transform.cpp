@@ -4,8 +4,8 @@ namespace radbake {
 
 Vec3 Transform::apply_to_normal(Vec3 n) const {
   const double sign = determinant() < 0 ? -1.0 : 1.0;
-  const Vec3 image = cross(columns[1], columns[2]) * n.x + cross(columns[2], columns[0]) * n.y +
-                     cross(columns[0], columns[1]) * n.z;
+  const Vec3 image =
+      cross(columns[1], columns[2]) * n.x + cross(columns[2], columns[0]) * n.y + cross(columns[0], columns[1]) * n.z;
   return image * sign;
 }
 

@@ -29,6 +29,8 @@ struct Tile {
   int x = 0, y = 0, width = 0, height = 0;
   int channels = 4;
   std::vector<float> values;
+  std::string layer_name = {};  ///< of the layer that it is a part of
+  int layer_width = 0, layer_height = 0;
 };
 
 /// One named image. Shapes: values [height * width * channels], rows from the top.

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/result.h"
 #include "common/scene/scene.h"
 #include "server/radiosity/survey/survey.h"
 
@@ -11,7 +12,7 @@ namespace radbake::radiosity {
 
 /// What a user may ask for. Zero means: choose.
 struct BakeOptions {
-  int atlas_size = 0;           ///< texels along a side, 64..4096; 0: the smallest power of two that gives texels_per_meter
+  int atlas_size = 0;  ///< texels along a side, 64..4096; 0: the smallest power of two that gives texels_per_meter
   double texels_per_meter = 0;  ///< 0: 32
   int rays = 0;                 ///< hemisphere rays a texel; a patch's row gets the same
   int max_patches = 0;
@@ -34,5 +35,26 @@ struct BakePlan {
   double texels_per_meter = 0;  ///< median over the lit triangles
   std::vector<Warning> warnings;
 };
+
+inline constexpr int kMinAtlasSize = 64;
+inline constexpr int kMaxAtlasSize = 4096;
+inline constexpr double kDefaultTexelsPerMeter = 32;
+inline constexpr int kDefaultRays = 512;
+inline constexpr int kMinRays = 8;
+inline constexpr int kMaxRays = 65536;
+inline constexpr int kDefaultMaxPatches = 16384;
+inline constexpr int kMinMaxPatches = 64;
+
+/// Shadow rays to emitters, a texel and a patch. A patch's estimate is averaged over many patches by every texel.
+inline constexpr int kLightSamplesPerTexel = 256;
+inline constexpr int kLightSamplesPerPatch = 64;
+
+/// Errors: kInvalidArgument naming the option and the value. Zero is always right: it means choose.
+Result<void> check_options(const BakeOptions& options);
+
+/// The wanted length of a patch's side: four texels (the second solve's detail comes from the texels), but at least
+/// kMinPatches on the whole scene and no more than asked for.
+/// Units: scene units in and out.
+double patch_edge(double texel_edge, double area, std::size_t max_patches);
 
 }  // namespace radbake::radiosity

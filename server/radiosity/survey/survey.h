@@ -5,6 +5,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene.h"
+#include "server/radiosity/survey/surfaces.h"
 
 namespace radbake::radiosity {
 
@@ -25,5 +26,22 @@ struct Survey {
   double extent_m = 0;  ///< longest side of the bounding box
   bool has_sky = false;
 };
+
+/// A scene that passed every check, as one list of triangles, with its facts.
+struct SurveyedScene {
+  Surfaces surfaces;  ///< refers to the scene: keep it alive
+  Survey survey;
+  std::vector<Warning> warnings;
+};
+
+/// Surfaces brighter than this many times the scene's area mean of E light by sampling; dimmer ones stay in the rows.
+inline constexpr double kEmitterThreshold = 4;
+
+/// Checks a scene and gathers its facts. Traces no ray.
+///
+/// Errors: kInvalidArgument, naming mesh, triangle, vertex, material or light and the value: index out of range,
+/// non-finite position, normal or texture coordinate, reflectance outside [0, 1), negative or non-finite emission,
+/// texture of impossible size, no triangle with area, no light.
+Result<SurveyedScene> survey_scene(const Scene& scene);
 
 }  // namespace radbake::radiosity

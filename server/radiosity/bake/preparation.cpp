@@ -1,0 +1,51 @@
+#include "server/radiosity/bake/preparation.h"
+
+#include "server/radiosity/bake/bake.h"
+
+namespace radbake::radiosity {
+
+Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const BakeOptions& options,
+                                                   std::stop_token stop) {
+  const Error cancelled{ErrorCode::kCancelled, "the bake was cancelled while it was prepared"};
+  RADBAKE_RETURN_IF_ERROR(check_options(options));
+  auto prepared = std::make_unique<Preparation>();
+  RADBAKE_ASSIGN_OR_RETURN(prepared->surveyed, survey_scene(scene));
+  const Surfaces& surfaces = prepared->surveyed.surfaces;
+  if (stop.stop_requested()) return cancelled;
+
+  const double density = options.texels_per_meter > 0 ? options.texels_per_meter : kDefaultTexelsPerMeter;
+  const int atlas_size = options.atlas_size > 0 ? options.atlas_size : atlas_size_for_density(surfaces, density);
+  RADBAKE_ASSIGN_OR_RETURN(prepared->atlas, Atlas::make(surfaces, atlas_size));
+  if (stop.stop_requested()) return cancelled;
+
+  double area = 0;
+  for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
+    area += surfaces.areas[t] * (surfaces.material(t).is_double_sided ? 2 : 1);
+  }
+  const auto max_patches = static_cast<std::size_t>(options.max_patches > 0 ? options.max_patches : kDefaultMaxPatches);
+  const double texel_edge = 1 / (prepared->atlas.texels_per_meter() * surfaces.metres_per_unit);
+  prepared->patches = make_patches(surfaces, {patch_edge(texel_edge, area, max_patches), max_patches});
+  if (stop.stop_requested()) return cancelled;
+
+  BakePlan& plan = prepared->plan;
+  plan.survey = prepared->surveyed.survey;
+  plan.atlas_size = atlas_size;
+  plan.num_texels = prepared->atlas.num_texels();
+  plan.num_patches = prepared->patches.size();
+  plan.rays_per_texel = options.rays > 0 ? options.rays : kDefaultRays;
+  plan.rays_per_row = plan.rays_per_texel;
+  plan.light_samples_per_texel = plan.survey.num_emitter_triangles > 0 ? kLightSamplesPerTexel : 0;
+  plan.estimator = "hemisphere";
+  plan.transport = "sparse";
+  plan.solver = "gauss-seidel";
+  plan.texels_per_meter = prepared->atlas.texels_per_meter();
+  plan.warnings = prepared->surveyed.warnings;
+  return prepared;
+}
+
+Result<BakePlan> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::unique_ptr<Preparation> prepared, prepare_scene(scene, options, stop));
+  return prepared->plan;
+}
+
+}  // namespace radbake::radiosity

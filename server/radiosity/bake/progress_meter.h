@@ -1,0 +1,39 @@
+#pragma once
+
+#include <chrono>
+#include <mutex>
+
+#include "server/radiosity/bake/bake.h"
+
+namespace radbake::radiosity {
+
+/// Turns the steps of the stages into one fraction that never falls, and a time left.
+/// The stages' shares are their numbers of rays; the estimate corrects itself as the bake goes on.
+class ProgressMeter {
+ public:
+  ProgressMeter(BakeObserver& observer, double row_rays, double gather_rays);
+
+  /// From any thread. Calls the observer at most about 20 times a second, and at the end of each stage.
+  void report(BakeStage stage, std::uint64_t done, std::uint64_t total, double residual = 0);
+  /// Calls the observer with a tile, apart from all other calls.
+  void tile(const Tile& tile);
+  /// The times of the stages that have ended and of the one that runs.
+  std::vector<StageTime> stage_times();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void enter(BakeStage stage);
+
+  BakeObserver& observer_;
+  std::mutex mutex_;
+  double row_share_;
+  double gather_share_;
+  double fraction_ = 0;
+  BakeStage stage_ = BakeStage::kPreparing;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point stage_start_ = start_;
+  Clock::time_point last_report_{};
+  std::vector<StageTime> times_;
+};
+
+}  // namespace radbake::radiosity

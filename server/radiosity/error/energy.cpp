@@ -1,0 +1,36 @@
+#include "server/radiosity/error/energy.h"
+
+#include <cmath>
+
+namespace radbake::radiosity {
+
+EnergyBalance audit_energy(const TransportOperator& transport, const EnergyTerms& terms) {
+  const auto areas = transport.areas();
+  EnergyBalance balance;
+  balance.is_closed = terms.is_closed;
+  double sent = 0, arrived = 0, leaving = 0, glow = 0, absorbed = 0, direct = 0, variance = 0;
+  for (std::uint32_t i = 0; i < areas.size(); ++i) {
+    const Vec3 indirect = transport.gather_at(i, terms.radiosity);
+    const Vec3 irradiance = indirect + terms.direct[i];
+    const double own = mean_component(terms.radiosity[i]);
+    sent += areas[i] * own;
+    arrived += areas[i] * mean_component(indirect);
+    // By reciprocity, A_i B'_i (1 - row sum) is what meets no patch.
+    leaving += areas[i] * own * (1 - transport.row_sum(i));
+    glow += areas[i] * mean_component(terms.glow[i]);
+    absorbed += areas[i] * mean_component(scaled_by(Vec3{1, 1, 1} - terms.reflectance[i], irradiance));
+    direct += areas[i] * mean_component(terms.direct[i]);
+    variance += areas[i] * areas[i] * terms.direct_variances[i];
+  }
+  if (sent > 0) balance.transported_relative_gap = std::fabs(sent - arrived - leaving) / sent;
+  balance.emitted = glow + terms.light_flux + terms.received_without_source;
+  balance.absorbed = absorbed;
+  if (!terms.is_closed) {
+    balance.escaped = leaving + (terms.light_flux + terms.received_without_source - direct);
+  }
+  balance.gap = balance.emitted - balance.absorbed - balance.escaped;
+  balance.gap_standard_error = std::sqrt(variance);
+  return balance;
+}
+
+}  // namespace radbake::radiosity

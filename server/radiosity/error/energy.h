@@ -1,0 +1,43 @@
+#pragma once
+
+#include <span>
+
+#include "common/geometry/vector.h"
+#include "server/radiosity/solve/solve.h"
+#include "server/radiosity/transport/operator.h"
+
+namespace radbake::radiosity {
+
+/// Sums over patches in the units of their areas, mean of the three channels. The report's EnergyAudit explains them.
+struct EnergyBalance {
+  bool is_closed = false;
+  double emitted = 0;
+  double absorbed = 0;
+  double escaped = 0;
+  double gap = 0;
+  double gap_standard_error = 0;
+  double transported_relative_gap = 0;
+};
+
+/// What an audit reads. Shapes: spans [n].
+struct EnergyTerms {
+  std::span<const Vec3> radiosity;  ///< B'
+  std::span<const Vec3> reflectance;
+  std::span<const Vec3> glow;                ///< E_in
+  std::span<const Vec3> direct;              ///< H^direct, sky included
+  std::span<const double> direct_variances;  ///< of the mean of the channels
+  double light_flux = 0;                     ///< sent by emitters and lamps
+  double received_without_source = 0;        ///< received from sky and sun: their flux has no other measure
+  bool is_closed = false;                    ///< no ray escaped or was absorbed by a back
+};
+
+/// Audits a solved system twice.
+///
+///   transported: sum A B' = sum A H^indirect + what leaves      to solver tolerance, on a reciprocal operator
+///   whole:       sum A E  = sum A (1 - rho) H + what leaves     to the standard error of the direct light
+///
+/// In an open scene the direct light that misses everything is not counted by rays: it is the difference between what
+/// the lights send and what arrives, so there the whole audit checks the transported part alone.
+EnergyBalance audit_energy(const TransportOperator& transport, const EnergyTerms& terms);
+
+}  // namespace radbake::radiosity

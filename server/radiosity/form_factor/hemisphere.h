@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/base/sequence.h"
+#include "server/radiosity/patches/patches.h"
+#include "server/radiosity/survey/site.h"
+#include "server/radiosity/visibility/visibility.h"
+
+namespace radbake::radiosity {
+
+/// Where the rays of one row went. arrivals.size() + escaped + absorbed = counted.
+struct RowSample {
+  std::vector<std::uint32_t> arrivals;  ///< patch of each ray that met one, in the order of the rays
+  std::uint32_t escaped = 0;            ///< rays that met nothing: the row's share of the sky
+  std::uint32_t absorbed = 0;           ///< rays that met the back of a single-sided surface
+  std::uint32_t counted = 0;            ///< rays from sites that are not buried
+  std::uint32_t traced = 0;
+  std::vector<std::uint8_t> is_buried;  ///< [sites]
+  double visible_share = 1;             ///< of the sites: those not buried
+};
+
+/// A form-factor row by rays: F_ij is the share of cosine-distributed rays from i that meet j first.
+///
+///   F_ij = 1/A_i int_i int_hemisphere cos(theta)/pi V_j(x, omega) d omega dA
+///
+/// The rays of one row are an Owen-scrambled Sobol sequence over the hemisphere, dealt to the sites in runs. Hits,
+/// escapes and absorptions sum to the rays counted by construction. A site is *buried* when more than half of its rays
+/// meet the back of single-sided surfaces: it lies inside other geometry, and its rays do not count. Rays about an
+/// interpolated normal that leave below the surface are rejected and do not count either.
+/// Errors: variance of F_ij is at most F (1 - F) / rays.
+/// Source: Malley's method, Shirley & Chiu 1997 (disk map); Owen 1995.
+class HemisphereEstimator {
+ public:
+  HemisphereEstimator(const Surfaces& surfaces, const Patches& patches, const Visibility& visibility, int rays)
+      : surfaces_(surfaces), patches_(patches), visibility_(visibility), points_(rays) {}
+
+  int rays() const { return points_.size(); }
+  /// How many sites a receiver should have for this number of rays.
+  int num_sites() const;
+
+  /// Buffers that one thread reuses from row to row.
+  struct Scratch {
+    std::vector<Ray> rays;
+    std::vector<Hit> hits;
+    std::vector<std::uint32_t> site_of_ray;
+  };
+
+  /// Traces one row. Shapes: sites [n], n >= 1.
+  void sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, RowSample& row) const;
+
+ private:
+  const Surfaces& surfaces_;
+  const Patches& patches_;
+  const Visibility& visibility_;
+  SobolPoints points_;
+};
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/base/sequence.h"
+#include "server/radiosity/survey/site.h"
+#include "server/radiosity/visibility/visibility.h"
+
+namespace radbake::radiosity {
+
+/// Light that arrives straight from small bright surfaces and lamps: the part of H^direct that rows leave out.
+///
+/// Surfaces: each sample chooses an emitter triangle by its likely share at the receiver, and a point on it, uniform in
+/// solid angle where it is near or large, else in area:
+///
+///   H = E/pi cos(theta) Omega V            H = E/pi cos(theta) cos(theta') A / r^2 V
+///
+/// Lamps: one shadow ray from each site. H = I cos(theta) / r^2 (point, spot), H = E_sun cos(theta) (directional).
+/// About an interpolated normal, the part of the cosine lobe under the surface, (1 - n.g)/2, is taken out and the rest
+/// scaled up, as the hemisphere rows do.
+/// Units:  lx; intensities in cd, distances turned to metres.
+/// Source: Shirley, Wang & Zimmerman 1996; Arvo 1995 (spherical triangles); KHR_lights_punctual (falloff of spots).
+class DirectLight {
+ public:
+  DirectLight(const Surfaces& surfaces, const Visibility& visibility, int samples);
+
+  /// Whether there is anything to sample.
+  bool is_dark() const { return emitters_.empty() && surfaces_.scene->lights.empty(); }
+  int samples() const { return points_.size(); }
+
+  struct Scratch {
+    std::vector<Ray> segments;
+    std::vector<Vec3> contributions;
+    std::vector<std::uint32_t> replicate_of;
+    std::vector<std::uint8_t> blocked;
+    std::vector<double> cumulative;
+  };
+
+  /// Estimates irradiance as independent replicates, each with its share of the samples; their mean is the estimate.
+  /// Shapes: sites [n], is_buried [n] (buried sites are left out), replicates [r], r divides samples().
+  /// Returns the number of shadow rays.
+  std::uint64_t estimate(std::span<const Site> sites, std::span<const std::uint8_t> is_buried, std::uint64_t seed,
+                         Scratch& scratch, std::span<Vec3> replicates) const;
+
+  /// Lumens that the emitters and lamps send out, mean of the three channels; suns do not count.
+  double emitted_lumens() const;
+
+ private:
+  struct Emitter {
+    std::uint32_t triangle;
+    Vec3 centroid;
+    double power;  ///< area times exitance, mean of the channels
+  };
+
+  void sample_emitters(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
+                       std::size_t num_replicates) const;
+  void sample_lamps(const std::vector<const Site*>& sites, Scratch& scratch, std::size_t num_replicates) const;
+
+  const Surfaces& surfaces_;
+  const Visibility& visibility_;
+  SobolPoints points_;
+  std::vector<Emitter> emitters_;
+  std::vector<double> cumulative_power_;
+};
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,45 @@
+#include "server/radiosity/patches/patches.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace radbake::radiosity {
+
+std::uint32_t Patches::cell_at(std::uint32_t group, const std::array<std::int32_t, 3>& at) const {
+  const Grid& grid = grids_[group];
+  const std::uint64_t flat = flat_index(grid, at);
+  if (grid.is_dense) return dense_[grid.dense_at + flat];
+  const auto found = sparse_.find({group, flat});
+  return found == sparse_.end() ? kNoPatch : found->second;
+}
+
+std::uint32_t Patches::find(std::uint32_t triangle, double u, double v, bool is_back) const {
+  const std::uint32_t group = group_of_[triangle];
+  const GridMap& map = maps_[triangle];
+  const Vec3 position = map.origin + map.per_u * u + map.per_v * v;
+  std::array<std::int32_t, 3> at;
+  for (int axis = 0; axis < 3; ++axis) {
+    at[axis] = std::clamp(static_cast<std::int32_t>(position[axis]), 0, grids_[group].cells[axis] - 1);
+  }
+  std::uint32_t cell = cell_at(group, at);
+  if (cell == kNoPatch) cell = some_cell_[triangle];
+  return is_back ? back_of_cell_[cell] : cell;
+}
+
+SurfacePoint Patches::sample(std::uint32_t patch, double x, double y) const {
+  const std::uint32_t cell = is_back(patch) ? cell_of_back_[patch - num_cells()] : patch;
+  // Choose a piece by area, and use what is left of x within it.
+  const auto begin = pieces_.begin() + static_cast<std::ptrdiff_t>(first_piece_[cell]);
+  const auto end = pieces_.begin() + static_cast<std::ptrdiff_t>(first_piece_[cell + 1]);
+  const double wanted = x * (end - 1)->area_up_to;
+  auto piece = std::upper_bound(begin, end, wanted, [](double a, const Piece& p) { return a < p.area_up_to; });
+  if (piece == end) --piece;
+  const double before = piece == begin ? 0 : (piece - 1)->area_up_to;
+  const double within = std::clamp((wanted - before) / (piece->area_up_to - before), 0.0, 1.0);
+  // Map the square to the triangle with uniform density: (1 - sqrt(s), y sqrt(s)).
+  const double root = std::sqrt(within);
+  const Vec2 p = piece->corners[0] * (1 - root) + piece->corners[1] * (root * (1 - y)) + piece->corners[2] * (root * y);
+  return {piece->triangle, p.x, p.y};
+}
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "common/base/sequence.h"
+#include "server/radiosity/survey/surfaces.h"
+
+namespace radbake::radiosity {
+
+inline constexpr std::uint32_t kNoPatch = 0xffffffffu;
+
+struct PatchOptions {
+  double edge = 0;              ///< wanted length of a patch's side, scene units
+  std::size_t max_patches = 0;  ///< bound on the number of patches, both sides of sheets counted
+};
+
+/// The senders: surface elements of constant radiosity, and the look-up from a hit to its element.
+///
+/// Neighbouring triangles of one material within 20 degrees form a group. A group is cut by a regular grid in its plane
+/// (by layers of height too, where it is curved): each occupied cell is a patch, so large triangles are split and
+/// small ones merged by one rule. Groups smaller than a cell that the bound does not allow apart are merged by
+/// position and direction. A double-sided cell has a patch on each side, with the same area.
+/// Indices: front patches first, one a cell, in the order of the triangles; back patches after them.
+class Patches {
+ public:
+  std::size_t size() const { return areas_.size(); }
+  std::size_t num_cells() const { return first_piece_.size() - 1; }
+
+  /// Scene units squared.
+  double area(std::uint32_t patch) const { return areas_[patch]; }
+  bool is_back(std::uint32_t patch) const { return patch >= num_cells(); }
+
+  /// The patch that a ray meets, or kNoPatch at the back of a single-sided surface.
+  /// Preconditions: u, v within the triangle up to rounding.
+  std::uint32_t find(std::uint32_t triangle, double u, double v, bool is_back) const;
+
+  /// A point of the patch, uniform by area for uniform (x, y) in the unit square; continuous within a piece.
+  SurfacePoint sample(std::uint32_t patch, double x, double y) const;
+
+  /// The direction that a point of this patch faces: the triangle's normal, turned for back patches.
+  Vec3 normal(std::uint32_t patch, const SurfacePoint& p, const Surfaces& surfaces) const {
+    return is_back(patch) ? -surfaces.normals[p.triangle] : surfaces.normals[p.triangle];
+  }
+
+ private:
+  friend class PatchBuilder;
+
+  /// A convex part of a triangle inside a cell, as one triangle of a fan.
+  struct Piece {
+    std::uint32_t triangle;
+    std::array<Vec2, 3> corners;  ///< barycentric weights (u, v)
+    double area_up_to;            ///< running sum over the cell's pieces, this one included
+  };
+  /// The grid of a group: grid coordinates of a triangle's points are affine in (u, v).
+  struct Grid {
+    std::array<std::int32_t, 3> cells = {1, 1, 1};
+    std::uint64_t dense_at = 0;  ///< into dense_, where the grid is small; else sparse_
+    bool is_dense = true;
+  };
+  struct GridMap {
+    Vec3 origin, per_u, per_v;
+  };
+  struct SparseCell {
+    std::uint32_t group;
+    std::uint64_t flat;
+    bool operator==(const SparseCell&) const = default;
+  };
+  struct SparseCellHash {
+    std::size_t operator()(const SparseCell& c) const { return mixed_bits(mixed_bits(c.group) ^ c.flat); }
+  };
+
+  std::uint32_t cell_at(std::uint32_t group, const std::array<std::int32_t, 3>& at) const;
+  static std::uint64_t flat_index(const Grid& grid, const std::array<std::int32_t, 3>& at) {
+    return (static_cast<std::uint64_t>(at[2]) * grid.cells[1] + at[1]) * static_cast<std::uint64_t>(grid.cells[0]) +
+           at[0];
+  }
+
+  std::vector<double> areas_;
+  std::vector<std::uint64_t> first_piece_;  ///< [num_cells + 1]
+  std::vector<Piece> pieces_;
+  std::vector<std::uint32_t> back_of_cell_;  ///< [num_cells], kNoPatch: single-sided
+  std::vector<std::uint32_t> cell_of_back_;  ///< [size() - num_cells()]
+  std::vector<std::uint32_t> group_of_;      ///< [triangles]
+  std::vector<GridMap> maps_;                ///< [triangles]
+  std::vector<std::uint32_t> some_cell_;     ///< [triangles] a cell of it, for hits that round out of all
+  std::vector<Grid> grids_;                  ///< [groups]
+  std::vector<std::uint32_t> dense_;
+  std::unordered_map<SparseCell, std::uint32_t, SparseCellHash> sparse_;
+};
+
+/// Cuts surfaces into patches of about the wanted edge, coarser where the bound asks for it.
+///
+/// Errors: none; the bound holds for max_patches >= 64 (checked).
+Patches make_patches(const Surfaces& surfaces, const PatchOptions& options);
+
+}  // namespace radbake::radiosity

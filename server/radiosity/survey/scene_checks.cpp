@@ -1,0 +1,166 @@
+#include "server/radiosity/survey/scene_checks.h"
+
+#include <numbers>
+#include <sstream>
+
+namespace radbake::radiosity {
+namespace {
+
+/// "mesh 'floor'", or its number where it has no name.
+template <typename T>
+std::string named(const char* kind, const std::vector<T>& all, std::size_t index) {
+  const std::string& name = all[index].name;
+  return std::string(kind) + " " + (name.empty() ? std::to_string(index) : "'" + name + "'");
+}
+
+std::string in_words(Vec3 v) {
+  std::ostringstream out;
+  out << "(" << v.x << ", " << v.y << ", " << v.z << ")";
+  return out.str();
+}
+
+Result<void> check_mesh(const Scene& scene, std::size_t m) {
+  const Mesh& mesh = scene.meshes[m];
+  const std::string name = named("mesh", scene.meshes, m);
+  if (mesh.material < 0 || static_cast<std::size_t>(mesh.material) >= scene.materials.size()) {
+    return invalid_argument(name + ": material " + std::to_string(mesh.material) + " does not exist; there are " +
+                            std::to_string(scene.materials.size()));
+  }
+  const std::size_t n = mesh.positions.size();
+  const auto has_wrong_length = [n](std::size_t length) { return length != 0 && length != n; };
+  if (has_wrong_length(mesh.normals.size()) || has_wrong_length(mesh.texcoord0.size()) ||
+      has_wrong_length(mesh.texcoord1.size())) {
+    return invalid_argument(name + ": attributes differ in length from its " + std::to_string(n) + " positions");
+  }
+  // Vertices that no triangle uses may hold anything.
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const std::uint32_t vertex : mesh.triangles[t]) {
+      const auto where = [&] {
+        return name + ", triangle " + std::to_string(t) + ", vertex " + std::to_string(vertex);
+      };
+      if (vertex >= n) return invalid_argument(where() + ": index out of range; the mesh has " + std::to_string(n));
+      if (!is_finite(mesh.positions[vertex])) {
+        return invalid_argument(where() + ": position " + in_words(mesh.positions[vertex]) + " is not finite");
+      }
+      if (!mesh.normals.empty() && !is_finite(mesh.normals[vertex])) {
+        return invalid_argument(where() + ": normal " + in_words(mesh.normals[vertex]) + " is not finite");
+      }
+      if ((!mesh.texcoord0.empty() && !is_finite(mesh.texcoord0[vertex])) ||
+          (!mesh.texcoord1.empty() && !is_finite(mesh.texcoord1[vertex]))) {
+        return invalid_argument(where() + ": a texture coordinate is not finite");
+      }
+    }
+  }
+  // A textured material needs the coordinates that it names.
+  const Material& material = scene.materials[mesh.material];
+  for (const auto& reference : {material.reflectance_texture, material.emissive_texture}) {
+    if (reference && (reference->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty() && !mesh.triangles.empty()) {
+      return invalid_argument(name + ": its material uses a texture by TEXCOORD_" +
+                              std::to_string(reference->texcoord) + ", which the mesh does not have");
+    }
+  }
+  return {};
+}
+
+Result<void> check_material(const Scene& scene, std::size_t i) {
+  const Material& material = scene.materials[i];
+  const std::string name = named("material", scene.materials, i);
+  if (!is_finite(material.reflectance) || min_component(material.reflectance) < 0 ||
+      max_component(material.reflectance) >= 1) {
+    return invalid_argument(name + ": reflectance " + in_words(material.reflectance) + " is not within [0, 1)");
+  }
+  if (!is_finite(material.emissive) || min_component(material.emissive) < 0) {
+    return invalid_argument(name + ": emissive luminance " + in_words(material.emissive) +
+                            " nit is not within [0, inf)");
+  }
+  for (const auto& reference : {material.reflectance_texture, material.emissive_texture}) {
+    if (!reference) continue;
+    if (reference->texture < 0 || static_cast<std::size_t>(reference->texture) >= scene.textures.size()) {
+      return invalid_argument(name + ": texture " + std::to_string(reference->texture) + " does not exist; there are " +
+                              std::to_string(scene.textures.size()));
+    }
+    if (reference->texcoord != 0 && reference->texcoord != 1) {
+      return invalid_argument(name + ": TEXCOORD_" + std::to_string(reference->texcoord) +
+                              " is not supported (0 or 1)");
+    }
+  }
+  // The product of factor and texture must reflect less than it gets, everywhere.
+  if (material.reflectance_texture) {
+    const TexturePlane& texture = scene.textures[material.reflectance_texture->texture];
+    Vec3 brightest;
+    for (std::size_t at = 0; at + 2 < texture.values.size(); at += texture.channels) {
+      for (int c = 0; c < 3; ++c) brightest[c] = std::fmax(brightest[c], texture.values[at + c]);
+    }
+    const Vec3 product = scaled_by(material.reflectance, brightest);
+    if (max_component(product) >= 1) {
+      return invalid_argument(name + ": reflectance times texture reaches " + in_words(product) + ", not below 1");
+    }
+  }
+  return {};
+}
+
+Result<void> check_texture(const Scene& scene, std::size_t i) {
+  const TexturePlane& texture = scene.textures[i];
+  const std::string name = named("texture", scene.textures, i);
+  const bool is_possible = texture.width > 0 && texture.height > 0 &&
+                           (texture.channels == 3 || texture.channels == 4) &&
+                           texture.values.size() == static_cast<std::size_t>(texture.width) * texture.height *
+                                                        static_cast<std::size_t>(texture.channels);
+  if (!is_possible) {
+    return invalid_argument(name + ": " + std::to_string(texture.values.size()) + " values for " +
+                            std::to_string(texture.width) + " x " + std::to_string(texture.height) + " x " +
+                            std::to_string(texture.channels));
+  }
+  for (std::size_t at = 0; at < texture.values.size(); ++at) {
+    if (!std::isfinite(texture.values[at]) || texture.values[at] < 0) {
+      return invalid_argument(name + ": value " + std::to_string(texture.values[at]) + " at " + std::to_string(at) +
+                              " is not within [0, inf)");
+    }
+  }
+  return {};
+}
+
+bool is_direction(Vec3 d) {
+  constexpr double kUnitTolerance = 1e-6;  // of directions that were normalised in single precision
+  return is_finite(d) && std::fabs(length(d) - 1) < kUnitTolerance;
+}
+
+bool is_amount(Vec3 v) { return is_finite(v) && min_component(v) >= 0; }
+
+Result<void> check_light(const Scene& scene, std::size_t i) {
+  const std::string name = named("light", scene.lights, i);
+  const auto& kind = scene.lights[i].kind;
+  if (const auto* point = std::get_if<PointLight>(&kind)) {
+    if (!is_finite(point->position)) return invalid_argument(name + ": position is not finite");
+    if (!is_amount(point->intensity))
+      return invalid_argument(name + ": intensity " + in_words(point->intensity) + " cd");
+  } else if (const auto* spot = std::get_if<SpotLight>(&kind)) {
+    if (!is_finite(spot->position)) return invalid_argument(name + ": position is not finite");
+    if (!is_direction(spot->direction)) return invalid_argument(name + ": direction is not of unit length");
+    if (!is_amount(spot->intensity)) return invalid_argument(name + ": intensity " + in_words(spot->intensity) + " cd");
+    if (!(0 <= spot->inner_cone_radians && spot->inner_cone_radians <= spot->outer_cone_radians &&
+          spot->outer_cone_radians <= std::numbers::pi / 2)) {
+      return invalid_argument(name + ": cone angles must be 0 <= inner <= outer <= pi/2, not " +
+                              std::to_string(spot->inner_cone_radians) + " and " +
+                              std::to_string(spot->outer_cone_radians));
+    }
+  } else if (const auto* sun = std::get_if<DirectionalLight>(&kind)) {
+    if (!is_direction(sun->direction)) return invalid_argument(name + ": direction is not of unit length");
+    if (!is_amount(sun->illuminance))
+      return invalid_argument(name + ": illuminance " + in_words(sun->illuminance) + " lx");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_scene_values(const Scene& scene) {
+  for (std::size_t i = 0; i < scene.textures.size(); ++i) RADBAKE_RETURN_IF_ERROR(check_texture(scene, i));
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) RADBAKE_RETURN_IF_ERROR(check_material(scene, i));
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) RADBAKE_RETURN_IF_ERROR(check_mesh(scene, i));
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) RADBAKE_RETURN_IF_ERROR(check_light(scene, i));
+  if (!is_amount(scene.sky)) return invalid_argument("sky: luminance " + in_words(scene.sky) + " nit");
+  return {};
+}
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/geometry/vector.h"
+#include "common/scene/scene.h"
+
+namespace radbake::radiosity {
+
+/// A place on a triangle: its index and the barycentric weights of its second and third corner.
+struct SurfacePoint {
+  std::uint32_t triangle = 0;
+  double u = 0;
+  double v = 0;
+};
+
+/// All triangles of a scene in one list, in the caller's order, without those of zero area.
+///
+/// Coordinates are the world's minus the centre of its bounding box, times a power of two that brings the longest side
+/// into [1, 2): single precision then serves a scene of any unit anywhere, and a scene scaled by a power of two gives
+/// the same numbers.
+/// Shapes: all arrays [size()].
+/// Units:  lengths in scene units; metres = units * metres_per_unit.
+class Surfaces {
+ public:
+  const Scene* scene = nullptr;
+  Vec3 centre;
+  double metres_per_unit = 1;
+
+  std::vector<std::array<Vec3, 3>> corners;
+  std::vector<Vec3> normals;             ///< geometric, unit length, on the front side
+  std::vector<double> areas;             ///< scene units squared
+  std::vector<std::uint32_t> meshes;     ///< index into scene->meshes
+  std::vector<std::uint32_t> in_mesh;    ///< index into its mesh's triangles
+  std::vector<double> ray_offsets;       ///< how far ray origins are lifted off the surface
+  std::vector<Vec3> exitances;           ///< E = pi L, mean over the triangle, lx
+  std::vector<std::uint8_t> is_emitter;  ///< small and bright: lights by sampling, E_out of the rows
+
+  std::size_t size() const { return corners.size(); }
+  const Mesh& mesh(std::uint32_t triangle) const { return scene->meshes[meshes[triangle]]; }
+  const std::array<std::uint32_t, 3>& vertices(std::uint32_t triangle) const {
+    return mesh(triangle).triangles[in_mesh[triangle]];
+  }
+  const Material& material(std::uint32_t triangle) const { return scene->materials[mesh(triangle).material]; }
+
+  Vec3 position(const SurfacePoint& p) const {
+    const auto& c = corners[p.triangle];
+    return c[0] * (1 - p.u - p.v) + c[1] * p.u + c[2] * p.v;
+  }
+  /// Interpolated NORMAL, unit length, or the geometric one where the mesh has none or it points away.
+  Vec3 shading_normal(const SurfacePoint& p) const;
+  /// Reflectance there: factor times texture, each channel in [0, 1).
+  Vec3 reflectance(const SurfacePoint& p) const;
+  /// Exitance there: pi times factor times texture, lx.
+  Vec3 exitance(const SurfacePoint& p) const;
+};
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "common/geometry/vector.h"
+#include "common/scene/scene.h"
+
+namespace radbake::radiosity {
+
+/// Colour of a texture at a coordinate, bilinear between texel centres, wrapped as the texture says. Linear light.
+Vec3 sampled_texture(const TexturePlane& texture, Vec2 uv);
+
+}  // namespace radbake::radiosity

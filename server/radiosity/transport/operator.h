@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/geometry/vector.h"
+
+namespace radbake::radiosity {
+
+/// The form factors between patches, as an operator: geometry only, so another light needs no new rays.
+class TransportOperator {
+ public:
+  virtual ~TransportOperator() = default;
+
+  /// A row F_i*: patches and form factors, ascending. Replaces what the vectors hold.
+  virtual void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const = 0;
+
+  /// H_i = sum_j F_ij B_j for one patch. Shapes: radiosity [n].
+  virtual Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const = 0;
+
+  /// sum_j F_ij
+  virtual double row_sum(std::uint32_t i) const = 0;
+
+  /// Entries of a row, for rounding bounds.
+  virtual std::size_t row_length(std::uint32_t i) const = 0;
+
+  /// Areas of the patches, as far as they are visible; A_i F_ij = A_j F_ji. Shapes: [n].
+  virtual std::span<const double> areas() const = 0;
+
+  std::size_t size() const { return areas().size(); }
+};
+
+}  // namespace radbake::radiosity

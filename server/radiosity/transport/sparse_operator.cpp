@@ -1,0 +1,185 @@
+#include "server/radiosity/transport/sparse_operator.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace radbake::radiosity {
+namespace {
+
+constexpr std::size_t kRowsPerTask = 256;
+/// Scaling ends when every row sum is right to this, or has stopped getting better.
+constexpr double kRowSumTolerance = 1e-14;
+constexpr int kMaxScalingSweeps = 500;
+
+template <typename Body>
+void for_each_row(std::size_t n, const Body& body) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kRowsPerTask), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) body(static_cast<std::uint32_t>(i));
+  });
+}
+
+/// The transpose of the counts, with rows in compressed form.
+struct Transposed {
+  std::vector<std::uint64_t> first;
+  std::vector<SampledRows::Entry> entries;
+
+  explicit Transposed(const SampledRows& rows) : first(rows.size() + 1, 0), entries(rows.entries.size()) {
+    for (const auto& entry : rows.entries) ++first[entry.patch + 1];
+    for (std::size_t i = 0; i < rows.size(); ++i) first[i + 1] += first[i];
+    std::vector<std::uint64_t> next(first.begin(), first.end() - 1);
+    for (std::uint32_t i = 0; i < rows.size(); ++i) {
+      for (std::uint64_t k = rows.first[i]; k < rows.first[i + 1]; ++k) {
+        entries[next[rows.entries[k].patch]++] = {i, rows.entries[k].count};
+      }
+    }
+  }
+};
+
+/// Calls visit(j, c_ij, c_ji) for every patch j that row i or column i holds, ascending.
+template <typename Visit>
+void merge_row_and_column(const SampledRows& rows, const Transposed& columns, std::uint32_t i, const Visit& visit) {
+  std::uint64_t a = rows.first[i], b = columns.first[i];
+  const std::uint64_t a_end = rows.first[i + 1], b_end = columns.first[i + 1];
+  while (a < a_end || b < b_end) {
+    const std::uint32_t ja = a < a_end ? rows.entries[a].patch : 0xffffffffu;
+    const std::uint32_t jb = b < b_end ? columns.entries[b].patch : 0xffffffffu;
+    const std::uint32_t j = std::min(ja, jb);
+    visit(j, ja == j ? rows.entries[a].count : 0u, jb == j ? columns.entries[b].count : 0u);
+    a += ja == j;
+    b += jb == j;
+  }
+}
+
+double measured_row_sum(const SampledRows& rows, std::uint32_t i) {
+  if (rows.counted[i] == 0) return 0;
+  return 1 - static_cast<double>(rows.escaped[i] + rows.absorbed[i]) / rows.counted[i];
+}
+
+}  // namespace
+
+SparseOperator::SparseOperator(const SampledRows& rows) : areas_(rows.areas) {
+  pair_estimates(rows);
+  restore_row_sums(rows);
+}
+
+void SparseOperator::pair_estimates(const SampledRows& rows) {
+  const std::size_t n = rows.size();
+  const Transposed columns(rows);
+  // Count, then fill, each row by itself.
+  first_.assign(n + 1, 0);
+  for_each_row(n, [&](std::uint32_t i) {
+    std::uint64_t length = 0;
+    merge_row_and_column(rows, columns, i, [&](std::uint32_t, std::uint32_t, std::uint32_t) { ++length; });
+    first_[i + 1] = length;
+  });
+  for (std::size_t i = 0; i < n; ++i) first_[i + 1] += first_[i];
+  patches_.resize(first_[n]);
+  exchange_.resize(first_[n]);
+
+  // Flux-weighted mean square of the two estimates' difference over their mean, before they are averaged.
+  std::vector<double> squares(n, 0), weights(n, 0);
+  const auto rays_per_area = [&](std::uint32_t i) { return areas_[i] > 0 ? rows.counted[i] / areas_[i] : 0; };
+  for_each_row(n, [&](std::uint32_t i) {
+    std::uint64_t at = first_[i];
+    const double wi = rays_per_area(i);
+    merge_row_and_column(rows, columns, i, [&](std::uint32_t j, std::uint32_t own, std::uint32_t other) {
+      const double wj = rays_per_area(j);
+      const double exchange = wi + wj > 0 ? (static_cast<double>(own) + other) / (wi + wj) : 0;
+      patches_[at] = j;
+      exchange_[at++] = static_cast<float>(exchange);
+      if (exchange > 0 && wi > 0 && wj > 0) {
+        const double difference = (own / wi - other / wj) / exchange;
+        squares[i] += exchange * difference * difference;
+        weights[i] += exchange;
+      }
+    });
+  });
+  double square = 0, weight = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    square += squares[i];
+    weight += weights[i];
+  }
+  repair_.num_entries = first_[n];
+  repair_.raw_reciprocity_rms = weight > 0 ? std::sqrt(square / weight) : 0;
+}
+
+double SparseOperator::scaled_row(std::uint32_t i) const {
+  double sum = 0;
+  for (std::uint64_t k = first_[i]; k < first_[i + 1]; ++k) sum += exchange_[k] * scale_[patches_[k]];
+  return sum * scale_[i];
+}
+
+void SparseOperator::restore_row_sums(const SampledRows& rows) {
+  const std::size_t n = rows.size();
+  scale_.assign(n, 1);
+  std::vector<double> target(n, 0), sums(n, 0);
+  double area = 0, escaped = 0, absorbed = 0;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    target[i] = areas_[i] * measured_row_sum(rows, i);
+    if (rows.counted[i] == 0) continue;
+    const double arrived = [&] {
+      std::uint64_t count = 0;
+      for (std::uint64_t k = rows.first[i]; k < rows.first[i + 1]; ++k) count += rows.entries[k].count;
+      return static_cast<double>(count);
+    }();
+    const double closure = (arrived + rows.escaped[i] + rows.absorbed[i]) / rows.counted[i];
+    repair_.raw_closure_max = std::max(repair_.raw_closure_max, std::fabs(closure - 1));
+    area += areas_[i];
+    escaped += areas_[i] * rows.escaped[i] / rows.counted[i];
+    absorbed += areas_[i] * rows.absorbed[i] / rows.counted[i];
+  }
+  repair_.escape_share = area > 0 ? escaped / area : 0;
+  repair_.absorbed_share = area > 0 ? absorbed / area : 0;
+
+  // d_i <- d_i sqrt(target_i / row_i) until the rows fit or stop getting better.
+  const auto measure = [&](bool with_rms) {
+    for_each_row(n, [&](std::uint32_t i) { sums[i] = target[i] > 0 ? scaled_row(i) : 0; });
+    double worst = 0, square = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (target[i] <= 0) continue;
+      const double error = sums[i] / target[i] - 1;
+      worst = std::max(worst, std::fabs(error));
+      square += areas_[i] * error * error;
+    }
+    if (with_rms && area > 0) repair_.paired_row_error_rms = std::sqrt(square / area);
+    return worst;
+  };
+  double worst = measure(true), best = worst;
+  int sweeps_since_best = 0;
+  constexpr int kPatience = 20;
+  while (worst > kRowSumTolerance && repair_.scaling_sweeps < kMaxScalingSweeps && sweeps_since_best < kPatience) {
+    for (std::size_t i = 0; i < n; ++i) {
+      if (target[i] > 0 && sums[i] > 0) scale_[i] *= std::sqrt(target[i] / sums[i]);
+    }
+    ++repair_.scaling_sweeps;
+    worst = measure(false);
+    sweeps_since_best = worst < 0.99 * best ? 0 : sweeps_since_best + 1;
+    best = std::min(best, worst);
+  }
+  repair_.repaired_row_error_max = worst;
+}
+
+void SparseOperator::row(std::uint32_t i, std::vector<std::uint32_t>& patches,
+                         std::vector<double>& form_factors) const {
+  patches.assign(patches_.begin() + static_cast<std::ptrdiff_t>(first_[i]),
+                 patches_.begin() + static_cast<std::ptrdiff_t>(first_[i + 1]));
+  form_factors.clear();
+  for (std::uint64_t k = first_[i]; k < first_[i + 1]; ++k) {
+    form_factors.push_back(scale_[i] * scale_[patches_[k]] * exchange_[k] / areas_[i]);
+  }
+}
+
+Vec3 SparseOperator::gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const {
+  Vec3 sum;
+  for (std::uint64_t k = first_[i]; k < first_[i + 1]; ++k) {
+    sum += radiosity[patches_[k]] * (exchange_[k] * scale_[patches_[k]]);
+  }
+  return areas_[i] > 0 ? sum * (scale_[i] / areas_[i]) : Vec3{};
+}
+
+double SparseOperator::row_sum(std::uint32_t i) const { return areas_[i] > 0 ? scaled_row(i) / areas_[i] : 0; }
+
+}  // namespace radbake::radiosity

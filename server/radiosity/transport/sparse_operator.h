@@ -1,0 +1,58 @@
+#pragma once
+
+#include <memory>
+
+#include "server/radiosity/transport/operator.h"
+#include "server/radiosity/transport/sampled_rows.h"
+
+namespace radbake::radiosity {
+
+/// What the sampled rows were like and what their repair did. Field for field TransportSummary of the report.
+struct TransportRepair {
+  std::uint64_t num_entries = 0;
+  double raw_reciprocity_rms = 0;
+  double raw_closure_max = 0;
+  double paired_row_error_rms = 0;
+  double repaired_row_error_max = 0;
+  int scaling_sweeps = 0;
+  double escape_share = 0;
+  double absorbed_share = 0;
+};
+
+/// Sampled rows as one reciprocal matrix in compressed rows.
+///
+/// A_i F_ij and A_j F_ji are two estimates of one number, S_ij, with variances A_i S_ij / N_i and A_j S_ij / N_j.
+/// Their average with inverse variances as weights is
+///
+///   S_ij = (c_ij + c_ji) / (N_i / A_i + N_j / A_j)          c: rays that arrived, N: rays of the row
+///
+/// A symmetric scaling F_ij = d_i S_ij d_j / A_i then restores the measured row sums r_i = 1 - (escaped +
+/// absorbed)/N_i: exactly where such a scaling exists (closed scenes), else as near as its fixed point comes. Cost:
+/// O(entries) memory, 8 bytes each; O(entries) a scaling sweep. Source: Knight, Ruiz & Ucar 2014 (symmetric scaling);
+/// van Leersum 1989 (why row sums and reciprocity both matter).
+class SparseOperator final : public TransportOperator {
+ public:
+  explicit SparseOperator(const SampledRows& rows);
+
+  const TransportRepair& repair() const { return repair_; }
+
+  void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
+  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override;
+  double row_sum(std::uint32_t i) const override;
+  std::size_t row_length(std::uint32_t i) const override { return first_[i + 1] - first_[i]; }
+  std::span<const double> areas() const override { return areas_; }
+
+ private:
+  void pair_estimates(const SampledRows& rows);
+  void restore_row_sums(const SampledRows& rows);
+  double scaled_row(std::uint32_t i) const;
+
+  std::vector<std::uint64_t> first_;
+  std::vector<std::uint32_t> patches_;
+  std::vector<float> exchange_;  ///< S_ij
+  std::vector<double> scale_;    ///< d_i
+  std::vector<double> areas_;
+  TransportRepair repair_;
+};
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,56 @@
+#include <vector>
+
+#include "common/base/check.h"
+#include "server/radiosity/visibility/visibility.h"
+
+namespace radbake::radiosity {
+namespace {
+
+Vec3 to_double(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+
+class BruteForceVisibility final : public Visibility {
+ public:
+  explicit BruteForceVisibility(std::span<const Corners> triangles) : triangles_(triangles.begin(), triangles.end()) {}
+
+  void trace(std::span<const Ray> rays, std::span<Hit> hits) const override {
+    RADBAKE_CHECK_EQ(rays.size(), hits.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = nearest(rays[i]);
+  }
+
+  void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const override {
+    RADBAKE_CHECK_EQ(segments.size(), blocked.size());
+    for (std::size_t i = 0; i < segments.size(); ++i) blocked[i] = nearest(segments[i]).triangle != kNoHit;
+  }
+
+  std::string instruction_set() const override { return "double"; }
+
+ private:
+  Hit nearest(const Ray& ray) const {
+    const Vec3 origin = to_double(ray.origin), direction = to_double(ray.direction);
+    Hit best;
+    double best_t = ray.max_distance;
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      // Solve origin + t d = a + u (b - a) + v (c - a) by Cramer's rule.
+      const auto& [a, b, c] = triangles_[i];
+      const Vec3 e1 = b - a, e2 = c - a, p = cross(direction, e2);
+      const double determinant = dot(e1, p);
+      if (determinant == 0) continue;
+      const Vec3 s = origin - a, q = cross(s, e1);
+      const double u = dot(s, p) / determinant, v = dot(direction, q) / determinant, t = dot(e2, q) / determinant;
+      if (u < 0 || v < 0 || u + v > 1 || t < 0 || t >= best_t) continue;
+      best_t = t;
+      best = {static_cast<std::uint32_t>(i), static_cast<float>(u), static_cast<float>(v)};
+    }
+    return best;
+  }
+
+  std::vector<Corners> triangles_;
+};
+
+}  // namespace
+
+std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles) {
+  return std::make_unique<BruteForceVisibility>(triangles);
+}
+
+}  // namespace radbake::radiosity

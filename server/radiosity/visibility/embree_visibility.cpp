@@ -1,0 +1,123 @@
+#include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "common/base/check.h"
+#include "server/radiosity/visibility/visibility.h"
+
+namespace radbake::radiosity {
+namespace {
+
+constexpr int kPacket = 16;
+
+/// Fills lane k of a packet; lanes without a ray are switched off by `valid`.
+template <typename Packet>
+void set_lane(Packet& packet, int k, const Ray& ray) {
+  packet.org_x[k] = ray.origin[0];
+  packet.org_y[k] = ray.origin[1];
+  packet.org_z[k] = ray.origin[2];
+  packet.dir_x[k] = ray.direction[0];
+  packet.dir_y[k] = ray.direction[1];
+  packet.dir_z[k] = ray.direction[2];
+  packet.tnear[k] = 0;
+  packet.tfar[k] = ray.max_distance;
+  packet.time[k] = 0;
+  packet.mask[k] = 0xffffffffu;
+  packet.id[k] = static_cast<unsigned>(k);
+  packet.flags[k] = 0;
+}
+
+class EmbreeVisibility final : public Visibility {
+ public:
+  explicit EmbreeVisibility(std::span<const Corners> triangles) {
+    device_ = rtcNewDevice(nullptr);
+    RADBAKE_CHECK(device_ != nullptr);
+    scene_ = rtcNewScene(device_);
+    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), 3 * triangles.size()));
+    auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                   3 * sizeof(unsigned), triangles.size()));
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      for (int corner = 0; corner < 3; ++corner) {
+        const std::size_t at = 3 * t + corner;
+        for (int axis = 0; axis < 3; ++axis) vertices[3 * at + axis] = static_cast<float>(triangles[t][corner][axis]);
+        indices[at] = static_cast<unsigned>(at);
+      }
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene_, geometry);
+    rtcReleaseGeometry(geometry);
+    // Build on one thread: ties between coplanar triangles are decided by the tree's order, and a tree that was built
+    // by several threads may order its leaves by chance.
+    tbb::task_arena one_thread(1);
+    one_thread.execute([this] { rtcJoinCommitScene(scene_); });
+    RADBAKE_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
+  }
+
+  ~EmbreeVisibility() override {
+    rtcReleaseScene(scene_);
+    rtcReleaseDevice(device_);
+  }
+  EmbreeVisibility(const EmbreeVisibility&) = delete;
+  EmbreeVisibility& operator=(const EmbreeVisibility&) = delete;
+
+  void trace(std::span<const Ray> rays, std::span<Hit> hits) const override {
+    RADBAKE_CHECK_EQ(rays.size(), hits.size());
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    alignas(64) int valid[kPacket];
+    RTCRayHit16 packet;
+    for (std::size_t first = 0; first < rays.size(); first += kPacket) {
+      const int count = static_cast<int>(std::min<std::size_t>(kPacket, rays.size() - first));
+      for (int k = 0; k < kPacket; ++k) {
+        valid[k] = k < count ? -1 : 0;
+        set_lane(packet.ray, k, rays[first + std::min(k, count - 1)]);
+        packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+        packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+      }
+      rtcIntersect16(valid, scene_, &context, &packet);
+      for (int k = 0; k < count; ++k) {
+        const bool is_hit = packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
+        hits[first + k] = is_hit ? Hit{packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k]} : Hit{};
+      }
+    }
+  }
+
+  void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const override {
+    RADBAKE_CHECK_EQ(segments.size(), blocked.size());
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    alignas(64) int valid[kPacket];
+    RTCRay16 packet;
+    for (std::size_t first = 0; first < segments.size(); first += kPacket) {
+      const int count = static_cast<int>(std::min<std::size_t>(kPacket, segments.size() - first));
+      for (int k = 0; k < kPacket; ++k) {
+        valid[k] = k < count ? -1 : 0;
+        set_lane(packet, k, segments[first + std::min(k, count - 1)]);
+      }
+      rtcOccluded16(valid, scene_, &context, &packet);
+      for (int k = 0; k < count; ++k) blocked[first + k] = packet.tfar[k] < 0;
+    }
+  }
+
+  std::string instruction_set() const override {
+    if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return "avx512";
+    if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) return "avx";
+    return "sse";
+  }
+
+ private:
+  RTCDevice device_ = nullptr;
+  RTCScene scene_ = nullptr;
+};
+
+}  // namespace
+
+std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles) {
+  return std::make_unique<EmbreeVisibility>(triangles);
+}
+
+}  // namespace radbake::radiosity

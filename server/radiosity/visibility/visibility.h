@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "common/geometry/vector.h"
+
+namespace radbake::radiosity {
+
+/// A half-line or segment: origin + t direction, 0 <= t <= max_distance. Direction need not be of unit length.
+struct Ray {
+  std::array<float, 3> origin;
+  std::array<float, 3> direction;
+  float max_distance = std::numeric_limits<float>::infinity();
+};
+
+inline constexpr std::uint32_t kNoHit = 0xffffffffu;
+
+/// The nearest triangle on a ray: its index and the barycentric weights of its second and third corner.
+struct Hit {
+  std::uint32_t triangle = kNoHit;
+  float u = 0;
+  float v = 0;
+};
+
+/// Answers what rays meet. Thread-safe; answers do not depend on how many threads ask.
+class Visibility {
+ public:
+  virtual ~Visibility() = default;
+
+  /// Nearest hit of each ray, from either side. Shapes: rays [n], hits [n].
+  virtual void trace(std::span<const Ray> rays, std::span<Hit> hits) const = 0;
+
+  /// Whether anything lies on each segment. Shapes: segments [n], blocked [n], 0 or 1.
+  virtual void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const = 0;
+
+  /// The instruction set that rays are traced with: equal bytes are promised for one.
+  virtual std::string instruction_set() const = 0;
+};
+
+using Corners = std::array<Vec3, 3>;
+
+/// Embree's tree over triangles, watertight at shared edges. Corners should lie within a few units of 0: they are
+/// stored in float.
+std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles);
+
+/// The slow twin for tests: every ray against every triangle, in double (Moeller & Trumbore 1997).
+std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles);
+
+}  // namespace radbake::radiosity

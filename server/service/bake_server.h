@@ -1,0 +1,62 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "common/base/limits.h"
+#include "common/base/result.h"
+#include "server/jobs/job_queue.h"
+#include "server/service/bakes_service.h"
+#include "server/service/content_service.h"
+#include "server/service/server_service.h"
+#include "server/service/workers_service.h"
+#include "server/store/content_store.h"
+#include "server/store/job_store.h"
+#include "server/store/task_pool.h"
+
+namespace radbake::service {
+
+struct BakeServerOptions {
+  std::string listen = "127.0.0.1:7419";  ///< host:port (0: any) or unix:PATH
+  std::filesystem::path data;             ///< everything that must survive lives here; one server at a time
+  jobs::QueueOptions queue;               ///< its max_* and spool folder are set from here
+  Limits limits;
+  std::uint32_t max_threads = 0;  ///< of a bake; 0: no bound
+};
+
+/// The whole server: stores, queue and services, listening. start() ... stop(), once.
+class BakeServer {
+ public:
+  /// Errors: kFailedPrecondition for a data folder in use, kUnavailable for an address that cannot be listened on.
+  static Result<std::unique_ptr<BakeServer>> start(BakeServerOptions options);
+  /// Stops.
+  ~BakeServer();
+
+  /// Where clients find it, with the port that was chosen.
+  const std::string& address() const { return address_; }
+
+  /// Refuses new work, queues running bakes for the next start, ends watches, and waits for calls to end.
+  void stop();
+
+ private:
+  BakeServer() = default;
+  Result<void> open_stores(const BakeServerOptions& options);
+  Result<void> listen(const BakeServerOptions& options);
+
+  store::FileDescriptor lock_;
+  std::unique_ptr<store::ContentStore> content_;
+  std::unique_ptr<store::JobStore> jobs_;
+  std::unique_ptr<jobs::JobQueue> queue_;
+  std::unique_ptr<store::TaskPool> pool_;
+  std::unique_ptr<WorkersService> workers_service_;
+  std::unique_ptr<ContentService> content_service_;
+  std::unique_ptr<BakesService> bakes_service_;
+  std::unique_ptr<ServerService> server_service_;
+  std::unique_ptr<grpc::Server> server_;
+  std::string address_;
+};
+
+}  // namespace radbake::service

@@ -1,0 +1,131 @@
+#include "server/service/bakes_service.h"
+
+#include <charconv>
+#include <utility>
+
+#include "server/service/convert.h"
+#include "server/service/plan_reactor.h"
+#include "server/service/scene_check.h"
+#include "server/service/status.h"
+#include "server/service/watch_reactor.h"
+
+namespace radbake::service {
+namespace {
+
+constexpr std::size_t kMaxRequestIdBytes = 128;
+constexpr std::size_t kMaxLabelBytes = 256;
+constexpr std::uint32_t kDefaultPageSize = 100;
+constexpr std::uint32_t kMaxPageSize = 1000;
+
+grpc::Status reply(const Result<std::shared_ptr<jobs::Job>>& job, v1::Bake& bake) {
+  if (!job.ok()) return to_status(job.error(), "max_queued_bakes");
+  bake = to_message(**job);
+  return grpc::Status::OK;
+}
+
+}  // namespace
+
+template <typename Body>
+grpc::ServerUnaryReactor* BakesService::run_on_pool(grpc::CallbackServerContext* context, Body body) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  pool_.post([context, reactor, body = std::move(body)] {
+    const grpc::Status admission = check_protocol(*context);
+    reactor->Finish(admission.ok() ? body() : admission);
+  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* BakesService::SubmitBake(grpc::CallbackServerContext* context,
+                                                   const v1::SubmitBakeRequest* request, v1::Bake* bake) {
+  return run_on_pool(context, [this, request, bake] { return submit(*request, *bake); });
+}
+
+grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, v1::Bake& bake) {
+  if (request.request_id().empty() || request.request_id().size() > kMaxRequestIdBytes) {
+    return bad_field("request_id", "must have 1 to " + std::to_string(kMaxRequestIdBytes) + " bytes, not " +
+                                       std::to_string(request.request_id().size()));
+  }
+  if (request.label().size() > kMaxLabelBytes) {
+    return bad_field("label",
+                     std::to_string(request.label().size()) + " bytes are above " + std::to_string(kMaxLabelBytes));
+  }
+  // A request that was accepted once is answered as it was, whatever became of its blobs and of the queue.
+  store::NewJob job;
+  job.request_id = request.request_id();
+  job.body_sha256 = digest_of(request.SerializeAsString()).sha256;
+  const auto known = queue_.find_request(job.request_id, job.body_sha256);
+  if (!known.ok() || *known) return reply(known, bake);
+
+  if (auto status = check_scene({request.manifest(), request.settings(), request.run()}, limits_, max_threads_,
+                                content_, job.work);
+      !status.ok()) {
+    return status;
+  }
+  job.label = request.label();
+  job.bake_key = make_bake_key(job.work);
+  return reply(queue_.submit(job), bake);
+}
+
+grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* context,
+                                                 const v1::PlanBakeRequest* request, v1::Plan* plan) {
+  auto* reactor = new PlanReactor(queue_, plan);
+  pool_.post([this, context, request, reactor] {
+    store::Work work;
+    grpc::Status status = check_protocol(*context);
+    if (status.ok()) {
+      status = check_scene({request->manifest(), request->settings(), request->run()}, limits_, max_threads_, content_,
+                           work);
+    }
+    reactor->begin(status, work);
+  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* BakesService::GetBake(grpc::CallbackServerContext* context, const v1::GetBakeRequest* request,
+                                                v1::Bake* bake) {
+  return run_on_pool(context, [this, request, bake] { return reply(queue_.find(request->name()), *bake); });
+}
+
+grpc::ServerUnaryReactor* BakesService::CancelBake(grpc::CallbackServerContext* context,
+                                                   const v1::CancelBakeRequest* request, v1::Bake* bake) {
+  return run_on_pool(context, [this, request, bake] { return reply(queue_.cancel(request->name()), *bake); });
+}
+
+grpc::ServerUnaryReactor* BakesService::ListBakes(grpc::CallbackServerContext* context,
+                                                  const v1::ListBakesRequest* request,
+                                                  v1::ListBakesResponse* response) {
+  return run_on_pool(context, [this, request, response] { return list(*request, *response); });
+}
+
+grpc::Status BakesService::list(const v1::ListBakesRequest& request, v1::ListBakesResponse& response) {
+  if (request.page_size() > kMaxPageSize) {
+    return bad_field("page_size", std::to_string(request.page_size()) + " is above " + std::to_string(kMaxPageSize));
+  }
+  // A page's token is the id of its predecessor's last bake.
+  std::int64_t before_id = 0;
+  const std::string& token = request.page_token();
+  if (!token.empty()) {
+    const auto [end, problem] = std::from_chars(token.data(), token.data() + token.size(), before_id);
+    if (problem != std::errc() || end != token.data() + token.size() || before_id <= 0) {
+      return bad_field("page_token", "'" + token.substr(0, 40) + "' is not a token of this server");
+    }
+  }
+  const std::uint32_t page_size = request.page_size() == 0 ? kDefaultPageSize : request.page_size();
+  auto records = queue_.list(page_size + 1, before_id);
+  if (!records.ok()) return to_status(records.error());
+  if (records->size() > page_size) {
+    records->pop_back();
+    response.set_next_page_token(std::to_string(records->back().id));
+  }
+  for (const store::JobRecord& record : *records) {
+    *response.add_bakes() = to_message(record, queue_.progress_of(record.name));
+  }
+  return grpc::Status::OK;
+}
+
+grpc::ServerWriteReactor<v1::WatchBakeResponse>* BakesService::WatchBake(grpc::CallbackServerContext* context,
+                                                                         const v1::WatchBakeRequest* request) {
+  return WatchReactor::start(check_protocol(*context), queue_, pool_, *request);
+}
+
+}  // namespace radbake::service

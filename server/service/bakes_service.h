@@ -1,0 +1,47 @@
+#pragma once
+
+#include "common/base/limits.h"
+#include "radbake/v1/bake.grpc.pb.h"
+#include "server/jobs/job_queue.h"
+#include "server/store/content_store.h"
+#include "server/store/task_pool.h"
+
+namespace radbake::service {
+
+/// radbake.v1.Bakes over the job queue. Everything that may wait for the disk runs on the pool.
+class BakesService : public v1::Bakes::CallbackService {
+ public:
+  /// max_threads: of a bake; 0: as many as it asks for.
+  BakesService(jobs::JobQueue& queue, store::ContentStore& content, store::TaskPool& pool, const Limits& limits,
+               std::uint32_t max_threads)
+      : queue_(queue), content_(content), pool_(pool), limits_(limits), max_threads_(max_threads) {}
+
+  grpc::ServerUnaryReactor* SubmitBake(grpc::CallbackServerContext* context, const v1::SubmitBakeRequest* request,
+                                       v1::Bake* bake) override;
+  grpc::ServerUnaryReactor* PlanBake(grpc::CallbackServerContext* context, const v1::PlanBakeRequest* request,
+                                     v1::Plan* plan) override;
+  grpc::ServerUnaryReactor* GetBake(grpc::CallbackServerContext* context, const v1::GetBakeRequest* request,
+                                    v1::Bake* bake) override;
+  grpc::ServerUnaryReactor* ListBakes(grpc::CallbackServerContext* context, const v1::ListBakesRequest* request,
+                                      v1::ListBakesResponse* response) override;
+  grpc::ServerUnaryReactor* CancelBake(grpc::CallbackServerContext* context, const v1::CancelBakeRequest* request,
+                                       v1::Bake* bake) override;
+  grpc::ServerWriteReactor<v1::WatchBakeResponse>* WatchBake(grpc::CallbackServerContext* context,
+                                                             const v1::WatchBakeRequest* request) override;
+
+ private:
+  grpc::Status submit(const v1::SubmitBakeRequest& request, v1::Bake& bake);
+  grpc::Status list(const v1::ListBakesRequest& request, v1::ListBakesResponse& response);
+
+  /// Runs a call on the pool and finishes it with the status it returns.
+  template <typename Body>
+  grpc::ServerUnaryReactor* run_on_pool(grpc::CallbackServerContext* context, Body body);
+
+  jobs::JobQueue& queue_;
+  store::ContentStore& content_;
+  store::TaskPool& pool_;
+  const Limits limits_;
+  const std::uint32_t max_threads_;
+};
+
+}  // namespace radbake::service

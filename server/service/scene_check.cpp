@@ -1,0 +1,125 @@
+#include "server/service/scene_check.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <set>
+
+#include "common/base/version.h"
+#include "radbake/v1/scene.pb.h"
+#include "server/service/convert.h"
+#include "server/service/status.h"
+
+namespace radbake::service {
+namespace {
+
+constexpr double kMaxTexelsPerMeter = 1e6;
+constexpr std::uint32_t kMaxThreads = 1024;
+
+grpc::Status check_settings(const v1::BakeSettings& settings, const v1::RunOptions& run, const Limits& limits) {
+  const std::uint32_t size = settings.atlas_size();
+  if (size != 0 && (size < limits.min_atlas_size || size > limits.max_atlas_size || !std::has_single_bit(size))) {
+    return bad_field("settings.atlas_size", std::to_string(size) + " is not a power of two from min_atlas_size " +
+                                                std::to_string(limits.min_atlas_size) + " to max_atlas_size " +
+                                                std::to_string(limits.max_atlas_size));
+  }
+  const double density = settings.texels_per_meter();
+  if (!(density >= 0 && density <= kMaxTexelsPerMeter)) {
+    return bad_field("settings.texels_per_meter", std::to_string(density) + " is not between 0 and 1000000");
+  }
+  if (settings.rays() > limits.max_rays) {
+    return bad_field("settings.rays",
+                     std::to_string(settings.rays()) + " is above max_rays " + std::to_string(limits.max_rays));
+  }
+  if (settings.max_patches() > limits.max_patches) {
+    return bad_field("settings.max_patches", std::to_string(settings.max_patches()) + " is above max_patches " +
+                                                 std::to_string(limits.max_patches));
+  }
+  if (run.threads() > kMaxThreads) {
+    return bad_field("run.threads", std::to_string(run.threads()) + " is above " + std::to_string(kMaxThreads));
+  }
+  return grpc::Status::OK;
+}
+
+grpc::Status check_counts(const v1::SceneManifest& manifest, const Limits& limits) {
+  std::uint64_t num_vertices = 0, num_triangles = 0, num_pixels = 0;
+  for (const v1::MeshRecord& mesh : manifest.meshes()) {
+    num_vertices += mesh.num_vertices();
+    num_triangles += mesh.num_triangles();
+  }
+  for (const v1::Texture& texture : manifest.textures()) {
+    num_pixels = std::max(num_pixels, std::uint64_t{texture.width()} * texture.height());
+  }
+  struct Count {
+    const char* limit;
+    std::uint64_t value, bound;
+  };
+  const Count counts[] = {
+      {"max_meshes", static_cast<std::uint64_t>(manifest.meshes_size()), limits.max_meshes},
+      {"max_textures", static_cast<std::uint64_t>(manifest.textures_size()), limits.max_textures},
+      {"max_lights", static_cast<std::uint64_t>(manifest.lights_size()), limits.max_lights},
+      {"max_vertices", num_vertices, limits.max_vertices},
+      {"max_triangles", num_triangles, limits.max_triangles},
+      {"max_texture_pixels", num_pixels, limits.max_texture_pixels},
+  };
+  for (const Count& count : counts) {
+    if (count.value > count.bound) return above_limit(count.limit, count.value, count.bound);
+  }
+  return grpc::Status::OK;
+}
+
+}  // namespace
+
+grpc::Status check_scene(const SceneRequest& request, const Limits& limits, std::uint32_t max_threads,
+                         const store::ContentStore& content, store::Work& work) {
+  if (auto status = check_settings(request.settings, request.run, limits); !status.ok()) return status;
+
+  // Read the manifest.
+  const Digest digest = from_message(request.manifest);
+  if (auto valid = validate_sha256(digest.sha256); !valid.ok()) return bad_field("manifest", valid.error().message);
+  if (digest.size_bytes > limits.max_manifest_bytes) {
+    return above_limit("max_manifest_bytes", digest.size_bytes, limits.max_manifest_bytes);
+  }
+  if (!content.contains(digest)) return missing_blobs({digest});
+  const auto bytes = content.read_blob(digest);
+  if (!bytes.ok()) return to_status(bytes.error());
+  v1::SceneManifest manifest;
+  if (!manifest.ParseFromString(*bytes)) {
+    return bad_field("manifest", "blob " + digest.sha256 + " is not a SceneManifest");
+  }
+  if (auto status = check_counts(manifest, limits); !status.ok()) return status;
+
+  // Every blob once, the manifest first.
+  std::set<Digest> known = {digest};
+  work.inputs = {digest};
+  const auto add = [&](const v1::Digest& message, const std::string& name) {
+    Digest blob = from_message(message);
+    if (auto valid = validate_sha256(blob.sha256); !valid.ok()) {
+      return bad_field("manifest", name + ": " + valid.error().message);
+    }
+    if (known.insert(blob).second) work.inputs.push_back(std::move(blob));
+    return grpc::Status::OK;
+  };
+  for (const v1::MeshRecord& mesh : manifest.meshes()) {
+    if (auto status = add(mesh.blob(), "mesh '" + mesh.name().substr(0, 100) + "'"); !status.ok()) return status;
+  }
+  for (const v1::Texture& texture : manifest.textures()) {
+    if (auto status = add(texture.blob(), "texture '" + texture.name().substr(0, 100) + "'"); !status.ok())
+      return status;
+  }
+  const std::vector<Digest> missing = content.find_missing(work.inputs);
+  if (!missing.empty()) return missing_blobs(missing);
+
+  v1::RunOptions run = request.run;
+  if (max_threads > 0 && (run.threads() == 0 || run.threads() > max_threads)) run.set_threads(max_threads);
+  work.manifest = digest;
+  work.settings = request.settings.SerializeAsString();
+  work.run = run.SerializeAsString();
+  return grpc::Status::OK;
+}
+
+std::string make_bake_key(const store::Work& work) {
+  return digest_of(work.manifest.sha256 + '\n' + work.settings + '\n' + kEngineVersion).sha256;
+}
+
+}  // namespace radbake::service

@@ -1,0 +1,111 @@
+#include "server/service/status.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "common/base/version.h"
+#include "google/rpc/error_details.pb.h"
+
+namespace radbake::service {
+namespace {
+
+// Details travel in a header: clients take 8 KiB of those.
+constexpr std::size_t kMaxViolations = 20;
+constexpr int kRetrySeconds = 1;
+
+constexpr std::array<std::pair<ErrorCode, grpc::StatusCode>, 9> kCodes = {{
+    {ErrorCode::kInvalidArgument, grpc::StatusCode::INVALID_ARGUMENT},
+    {ErrorCode::kNotFound, grpc::StatusCode::NOT_FOUND},
+    {ErrorCode::kAlreadyExists, grpc::StatusCode::ALREADY_EXISTS},
+    {ErrorCode::kFailedPrecondition, grpc::StatusCode::FAILED_PRECONDITION},
+    {ErrorCode::kResourceExhausted, grpc::StatusCode::RESOURCE_EXHAUSTED},
+    {ErrorCode::kDataLoss, grpc::StatusCode::DATA_LOSS},
+    {ErrorCode::kUnavailable, grpc::StatusCode::UNAVAILABLE},
+    {ErrorCode::kCancelled, grpc::StatusCode::CANCELLED},
+    {ErrorCode::kInternal, grpc::StatusCode::INTERNAL},
+}};
+
+grpc::StatusCode to_code(ErrorCode code) {
+  const auto* found = std::find_if(kCodes.begin(), kCodes.end(), [&](const auto& pair) { return pair.first == code; });
+  return found == kCodes.end() ? grpc::StatusCode::INTERNAL : found->second;
+}
+
+grpc::Status with_detail(grpc::StatusCode code, const std::string& message, const google::protobuf::Message& detail) {
+  google::rpc::Status status;
+  status.set_code(code);
+  status.set_message(message);
+  status.add_details()->PackFrom(detail);
+  return {code, message, status.SerializeAsString()};
+}
+
+grpc::Status quota_failure(const std::string& limit, const std::string& message) {
+  google::rpc::QuotaFailure quota;
+  auto* violation = quota.add_violations();
+  violation->set_subject(limit);
+  violation->set_description(message);
+  return with_detail(grpc::StatusCode::RESOURCE_EXHAUSTED, message, quota);
+}
+
+}  // namespace
+
+grpc::Status to_status(const Error& error, const std::string& limit) {
+  if (error.code == ErrorCode::kResourceExhausted) return quota_failure(limit, error.message);
+  if (error.code == ErrorCode::kUnavailable) {
+    google::rpc::RetryInfo retry;
+    retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
+    return with_detail(grpc::StatusCode::UNAVAILABLE, error.message, retry);
+  }
+  return {to_code(error.code), error.message};
+}
+
+grpc::Status missing_blobs(const std::vector<Digest>& missing) {
+  google::rpc::PreconditionFailure failure;
+  for (std::size_t i = 0; i < std::min(missing.size(), kMaxViolations); ++i) {
+    auto* violation = failure.add_violations();
+    violation->set_type("MISSING");
+    violation->set_subject("blobs/" + missing[i].sha256 + "/" + std::to_string(missing[i].size_bytes));
+  }
+  return with_detail(grpc::StatusCode::FAILED_PRECONDITION,
+                     std::to_string(missing.size()) + " blobs of the scene are not on the server, the first is " +
+                         missing.front().sha256 + ": upload them first",
+                     failure);
+}
+
+grpc::Status bad_field(const std::string& field, const std::string& description) {
+  google::rpc::BadRequest bad;
+  auto* violation = bad.add_field_violations();
+  violation->set_field(field);
+  violation->set_description(description);
+  return with_detail(grpc::StatusCode::INVALID_ARGUMENT, field + ": " + description, bad);
+}
+
+grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uint64_t bound) {
+  return quota_failure(limit, std::to_string(value) + " is above " + limit + " " + std::to_string(bound));
+}
+
+grpc::Status check_protocol(const grpc::CallbackServerContext& context) {
+  const auto& metadata = context.client_metadata();
+  const auto found = metadata.find("radbake-protocol");
+  if (found == metadata.end()) return grpc::Status::OK;
+  const std::string theirs(found->second.data(), found->second.size());
+  if (theirs == std::to_string(kProtocolMajor)) return grpc::Status::OK;
+  return {grpc::StatusCode::FAILED_PRECONDITION,
+          "the client speaks protocol " + theirs.substr(0, 20) + ", this server (radbaked " + kEngineVersion +
+              ") speaks protocol " + std::to_string(kProtocolMajor) + ": use a client of the server's version"};
+}
+
+google::rpc::Status to_message(const Error& error) {
+  google::rpc::Status status;
+  status.set_code(to_code(error.code));
+  status.set_message(error.message);
+  return status;
+}
+
+Error from_message(const google::rpc::Status& status) {
+  const auto* found =
+      std::find_if(kCodes.begin(), kCodes.end(), [&](const auto& pair) { return pair.second == status.code(); });
+  return {found == kCodes.end() ? ErrorCode::kInternal : found->first, status.message()};
+}
+
+}  // namespace radbake::service

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <string>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/result.h"
+#include "google/rpc/status.pb.h"
+
+namespace radbake::service {
+
+// Errors as the wire knows them: a gRPC status whose details (google.rpc.*) programs can read.
+
+/// The status of an error. Above a limit it carries QuotaFailure with the limit's name as subject, where the server
+/// cannot serve now it carries RetryInfo.
+grpc::Status to_status(const Error& error, const std::string& limit = "");
+
+/// FAILED_PRECONDITION with a PreconditionFailure MISSING for the first blobs of the list.
+grpc::Status missing_blobs(const std::vector<Digest>& missing);
+
+/// INVALID_ARGUMENT with a BadRequest violation of one field of the request.
+grpc::Status bad_field(const std::string& field, const std::string& description);
+
+/// RESOURCE_EXHAUSTED with a QuotaFailure that names a limit and the value that is above it.
+grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uint64_t bound);
+
+/// OK unless the caller says (metadata radbake-protocol) that it speaks another major version than ours.
+grpc::Status check_protocol(const grpc::CallbackServerContext& context);
+
+google::rpc::Status to_message(const Error& error);
+Error from_message(const google::rpc::Status& status);
+
+}  // namespace radbake::service

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <optional>
+
+#include "common/base/limits.h"
+#include "radbake/v1/content.pb.h"
+#include "server/store/content_store.h"
+#include "server/store/task_pool.h"
+
+namespace radbake::service {
+
+/// One Upload call. Either one read is outstanding or one task runs on the pool, never both, so nothing here needs a
+/// lock; the next chunk is asked for when the last one is on its way to the disk. A cancelled call shows as a failed
+/// read. Deletes itself.
+class UploadReactor : public grpc::ServerReadReactor<v1::UploadChunk> {
+ public:
+  UploadReactor(const grpc::Status& admission, store::ContentStore& content, store::TaskPool& pool,
+                const Limits& limits, v1::UploadResult* result);
+
+  void OnReadDone(bool ok) override;
+  void OnDone() override { delete this; }
+
+ private:
+  /// Stores the chunk just read; the status to finish with, or none to read on.
+  std::optional<grpc::Status> take_chunk();
+
+  store::ContentStore& content_;
+  store::TaskPool& pool_;
+  const Limits limits_;
+  v1::UploadResult* const result_;
+  v1::UploadChunk chunk_;
+  std::optional<Digest> digest_;
+  std::uint64_t next_offset_ = 0;
+};
+
+}  // namespace radbake::service

@@ -1,0 +1,41 @@
+#include <signal.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "client/cli/commands.h"
+
+namespace {
+
+using namespace radbake::cli;
+
+ExitCode run(const CommandContext& context) {
+  switch (context.line.command) {
+    case Command::kSubmit: return run_submit(context);
+    case Command::kList: return run_list(context);
+    case Command::kWatch: return run_watch(context);
+    case Command::kCancel: return run_cancel(context);
+    case Command::kDownload: return run_download(context);
+    case Command::kCapabilities: return run_capabilities(context);
+  }
+  return kUsage;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // A reader of our stdout that goes away must not keep us from cleaning up.
+  signal(SIGPIPE, SIG_IGN);
+  const std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
+  const auto parsed = parse_command_line(arguments);
+  if (const auto* exit = std::get_if<EarlyExit>(&parsed)) {
+    std::fputs(exit->out.c_str(), stdout);
+    std::fputs(exit->err.c_str(), stderr);
+    return exit->code;
+  }
+  const CommandLine& line = std::get<CommandLine>(parsed);
+  const Interrupt interrupt;
+  const bool is_stream = line.command == Command::kSubmit || line.command == Command::kWatch;
+  const auto reporter = line.json ? make_json_reporter(is_stream) : make_text_reporter();
+  return run({line, *reporter, interrupt});
+}

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/scene/scene.h"
+
+namespace radbake::cli {
+
+enum class Command { kSubmit, kList, kWatch, kCancel, kDownload, kCapabilities };
+
+/// What decides a bake. Zero means: the server's default.
+struct BakeChoices {
+  std::uint32_t atlas_size = 0;
+  std::uint32_t rays = 0;
+  std::uint32_t max_patches = 0;
+  std::uint64_t seed = 0;
+  std::uint32_t threads = 0;
+  double max_reflectance = 0.98;
+  std::optional<Vec3> sky;
+  std::optional<DirectionalLight> sun;
+};
+
+/// A valid command line.
+struct CommandLine {
+  Command command = Command::kCapabilities;
+  std::string server;  ///< empty: a private one
+  bool json = false;
+  std::filesystem::path scene;   ///< submit
+  BakeChoices bake;              ///< submit
+  std::string job;               ///< watch, cancel, download: bakes/ID
+  std::filesystem::path output;  ///< submit, download
+  bool force = false;            ///< submit, download
+};
+
+/// The program is to print this and end: help, version, or what is wrong with the command line.
+struct EarlyExit {
+  int code = 0;
+  std::string out;
+  std::string err;
+};
+
+/// Reads the command line and RADBAKE_SERVER. Errors: an EarlyExit with code 2 whose text names the option and value.
+std::variant<CommandLine, EarlyExit> parse_command_line(const std::vector<std::string>& arguments);
+
+}  // namespace radbake::cli

@@ -1,0 +1,182 @@
+#include "client/cli/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include "client/cli/exit_code.h"
+#include "common/base/version.h"
+
+namespace radbake::cli {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class Options : public testing::Test {
+ protected:
+  void SetUp() override { unsetenv("RADBAKE_SERVER"); }
+
+  static std::vector<std::string> submit_with(std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"submit", "scene.glb", "-o", "out"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  static CommandLine accepted(const std::vector<std::string>& arguments) {
+    const auto parsed = parse_command_line(arguments);
+    if (const auto* exit = std::get_if<EarlyExit>(&parsed)) ADD_FAILURE() << exit->out << exit->err;
+    return std::holds_alternative<CommandLine>(parsed) ? std::get<CommandLine>(parsed) : CommandLine();
+  }
+
+  static EarlyExit refused(const std::vector<std::string>& arguments) {
+    const auto parsed = parse_command_line(arguments);
+    EXPECT_TRUE(std::holds_alternative<EarlyExit>(parsed)) << testing::PrintToString(arguments) << " was accepted";
+    return std::holds_alternative<EarlyExit>(parsed) ? std::get<EarlyExit>(parsed) : EarlyExit();
+  }
+};
+
+TEST_F(Options, ReadsEveryChoiceOfSubmit) {
+  const CommandLine line = accepted(submit_with({"--server",
+                                                 "bakery:7419",
+                                                 "--atlas-size",
+                                                 "256",
+                                                 "--sky",
+                                                 "1,2,3.5",
+                                                 "--sun",
+                                                 "0,-2,0:10,20,30",
+                                                 "--rays",
+                                                 "512",
+                                                 "--max-patches",
+                                                 "4000",
+                                                 "--max-reflectance",
+                                                 "0.9",
+                                                 "--threads",
+                                                 "2",
+                                                 "--seed",
+                                                 "7",
+                                                 "--json",
+                                                 "--force"}));
+  EXPECT_EQ(line.command, Command::kSubmit);
+  EXPECT_EQ(line.server, "bakery:7419");
+  EXPECT_EQ(line.scene, "scene.glb");
+  EXPECT_EQ(line.output, "out");
+  EXPECT_EQ(line.bake.atlas_size, 256u);
+  EXPECT_EQ(line.bake.sky, (Vec3{1, 2, 3.5}));
+  ASSERT_TRUE(line.bake.sun.has_value());
+  EXPECT_EQ(line.bake.sun->direction, (Vec3{0, -1, 0}));
+  EXPECT_EQ(line.bake.sun->illuminance, (Vec3{10, 20, 30}));
+  EXPECT_EQ(line.bake.rays, 512u);
+  EXPECT_EQ(line.bake.max_patches, 4000u);
+  EXPECT_EQ(line.bake.max_reflectance, 0.9);
+  EXPECT_EQ(line.bake.threads, 2u);
+  EXPECT_EQ(line.bake.seed, 7u);
+  EXPECT_TRUE(line.json);
+  EXPECT_TRUE(line.force);
+}
+
+TEST_F(Options, LeavesToTheServerWhatIsNotChosen) {
+  const BakeChoices bake = accepted(submit_with({})).bake;
+  EXPECT_EQ(bake.atlas_size, 0u);
+  EXPECT_EQ(bake.rays, 0u);
+  EXPECT_EQ(bake.max_patches, 0u);
+  EXPECT_EQ(bake.threads, 0u);
+  EXPECT_EQ(bake.max_reflectance, 0.98);
+  EXPECT_FALSE(bake.sky.has_value());
+  EXPECT_FALSE(bake.sun.has_value());
+}
+
+TEST_F(Options, TakesASunThatStartsWithAMinus) {
+  const CommandLine line = accepted(submit_with({"--sun", "-1,0,0:1,1,1"}));
+  ASSERT_TRUE(line.bake.sun.has_value());
+  EXPECT_EQ(line.bake.sun->direction, (Vec3{-1, 0, 0}));
+}
+
+TEST_F(Options, TakesTheWholeRangeOfSeeds) {
+  EXPECT_EQ(accepted(submit_with({"--seed", "18446744073709551615"})).bake.seed, UINT64_MAX);
+}
+
+TEST_F(Options, TakesTheServerFromTheEnvironment) {
+  setenv("RADBAKE_SERVER", "unix:/run/radbake", 1);
+  EXPECT_EQ(accepted({"list"}).server, "unix:/run/radbake");
+  EXPECT_EQ(accepted({"list", "--server", "other:1"}).server, "other:1");
+  unsetenv("RADBAKE_SERVER");
+}
+
+TEST_F(Options, NamesAJobByItsIdToo) {
+  EXPECT_EQ(accepted({"watch", "bakes/3f", "--server", "s"}).job, "bakes/3f");
+  EXPECT_EQ(accepted({"watch", "3f", "--server", "s"}).job, "bakes/3f");
+}
+
+TEST_F(Options, NeedsAServerForOtherPeoplesBakes) {
+  const std::vector<std::vector<std::string>> commands = {
+      {"list"}, {"watch", "3f"}, {"cancel", "3f"}, {"download", "3f", "-o", "out"}};
+  for (const auto& arguments : commands) {
+    const EarlyExit exit = refused(arguments);
+    EXPECT_EQ(exit.code, kUsage);
+    EXPECT_THAT(exit.err, AllOf(HasSubstr(arguments[0]), HasSubstr("--server"), HasSubstr("RADBAKE_SERVER")));
+  }
+}
+
+struct BadOption {
+  std::vector<std::string> arguments;
+  std::string named;
+};
+
+class BadOptions : public Options, public testing::WithParamInterface<BadOption> {};
+
+TEST_P(BadOptions, AreUsageErrorsThatNameOptionAndValue) {
+  const EarlyExit exit = refused(submit_with(GetParam().arguments));
+  EXPECT_EQ(exit.code, kUsage);
+  EXPECT_THAT(exit.out, IsEmpty());
+  EXPECT_THAT(exit.err, HasSubstr(GetParam().named));
+  EXPECT_THAT(exit.err, HasSubstr(GetParam().arguments[0]));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Submit, BadOptions,
+    testing::Values(
+        BadOption{{"--atlas-size", "100"}, "'100' is not a power of two from 64 to 4096"},
+        BadOption{{"--atlas-size", "32"}, "'32'"}, BadOption{{"--atlas-size", "8192"}, "'8192'"},
+        BadOption{{"--atlas-size", "0"}, "'0'"}, BadOption{{"--atlas-size", "-256"}, "'-256'"},
+        BadOption{{"--atlas-size", "256x"}, "'256x'"}, BadOption{{"--sky", "1,2"}, "R,G,B"},
+        BadOption{{"--sky", "1,2,3,4"}, "R,G,B"}, BadOption{{"--sky", "1,2,-3"}, "below 0"},
+        BadOption{{"--sky", "1,x,3"}, "'x' is not a number"}, BadOption{{"--sky", "1,nan,3"}, "'nan' is not finite"},
+        BadOption{{"--sky", "1,1e999,3"}, "'1e999'"}, BadOption{{"--sky", ""}, "R,G,B"},
+        BadOption{{"--sun", "0,0,0:1,1,1"}, "0,0,0 is zero"}, BadOption{{"--sun", "0,-1,0"}, "DX,DY,DZ:R,G,B"},
+        BadOption{{"--sun", "0,-1,0:1,1,-1"}, "below 0"}, BadOption{{"--sun", "0,inf,0:1,1,1"}, "'inf' is not finite"},
+        BadOption{{"--rays", "0"}, "'0' is not a whole number from 1"}, BadOption{{"--rays", "1.5"}, "'1.5'"},
+        BadOption{{"--rays", "-5"}, "'-5'"}, BadOption{{"--rays", "99999999999999999999999"}, "999"},
+        BadOption{{"--max-patches", "0"}, "'0'"}, BadOption{{"--max-patches", "many"}, "'many'"},
+        BadOption{{"--max-reflectance", "1"}, "'1' is not a number from 0 to below 1"},
+        BadOption{{"--max-reflectance", "-0.1"}, "'-0.1'"}, BadOption{{"--max-reflectance", "nan"}, "'nan'"},
+        BadOption{{"--threads", "0"}, "'0'"}, BadOption{{"--seed", "-1"}, "-1"}, BadOption{{"--seed", "x"}, "x"},
+        BadOption{{"--frobnicate"}, "--frobnicate"}));
+
+TEST_F(Options, NamesWhatIsMissing) {
+  EXPECT_EQ(refused({}).code, kUsage);
+  EXPECT_EQ(refused({"frobnicate"}).code, kUsage);
+  EXPECT_THAT(refused({"submit", "-o", "out"}).err, HasSubstr("SCENE"));
+  EXPECT_THAT(refused({"submit", "scene.glb"}).err, HasSubstr("--output"));
+  EXPECT_THAT(refused({"watch", "--server", "s"}).err, HasSubstr("JOB"));
+}
+
+TEST_F(Options, HelpsEverywhereWithExamples) {
+  for (const char* command : {"submit", "list", "watch", "cancel", "download", "capabilities"}) {
+    const EarlyExit exit = refused({command, "--help"});
+    EXPECT_EQ(exit.code, kDone);
+    EXPECT_THAT(exit.err, IsEmpty());
+    EXPECT_THAT(exit.out, AllOf(HasSubstr("Examples:\n  radbake "), HasSubstr("--server"), HasSubstr("Exit codes:")));
+  }
+  EXPECT_THAT(refused({"--help"}).out, AllOf(HasSubstr("Examples:"), HasSubstr("submit"), HasSubstr("capabilities")));
+}
+
+TEST_F(Options, TellsItsVersion) {
+  const EarlyExit exit = refused({"--version"});
+  EXPECT_EQ(exit.code, kDone);
+  EXPECT_THAT(exit.out, HasSubstr(std::string("radbake ") + kEngineVersion + " (protocol 1."));
+}
+
+}  // namespace
+}  // namespace radbake::cli

@@ -1,0 +1,40 @@
+#include "client/cli/progress_line.h"
+
+#include <gtest/gtest.h>
+
+namespace radbake::cli {
+namespace {
+
+TEST(ProgressLine, ShowsStageBarPercentageAndTimeLeft) {
+  EXPECT_EQ(format_progress("gathering", 0.5, 65, 200, false),
+            "gathering       [###############...............]   50 %  1 min 05 s left");
+}
+
+TEST(ProgressLine, LeavesOutATimeThatIsNotKnown) {
+  EXPECT_EQ(format_progress("solving", 0.2, -1, 0, false), "solving          20 %");
+}
+
+TEST(ProgressLine, SaysAHundredPercentOnlyAtTheEnd) {
+  EXPECT_EQ(format_progress("writing", 0.999, -1, 0, false), "writing          99 %");
+  EXPECT_EQ(format_progress("writing", 1.2, -1, 0, false), "writing         100 %");
+}
+
+TEST(ProgressLine, HasNoPercentageForAStageOfUnknownLength) {
+  EXPECT_EQ(format_progress("reading", -1, -1, 200, false), "reading ...");
+}
+
+TEST(ProgressLine, StaysWithinTheTerminal) {
+  for (int width = 50; width <= 200; ++width) {
+    EXPECT_LT(format_progress("form factors", 0.5, 86399, width, false).size(), static_cast<std::size_t>(width));
+  }
+}
+
+TEST(ProgressLine, WritesTimesForPeople) {
+  EXPECT_EQ(format_seconds(0.4), "0 s");
+  EXPECT_EQ(format_seconds(59.6), "1 min 00 s");
+  EXPECT_EQ(format_seconds(3600), "1 h 00 min");
+  EXPECT_EQ(format_seconds(7500), "2 h 05 min");
+}
+
+}  // namespace
+}  // namespace radbake::cli

@@ -1,0 +1,70 @@
+#include "client/cli/scene_light.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace radbake::cli {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+/// One triangle of material 0; material 1 is in nobody's use.
+Scene dark_scene() {
+  Scene scene;
+  scene.materials.resize(2);
+  scene.meshes.resize(1);
+  scene.meshes[0].positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  scene.meshes[0].triangles = {{0, 1, 2}};
+  return scene;
+}
+
+TEST(SceneLight, RefusesADarkSceneAndSaysHowToLightIt) {
+  const Result<void> refused = require_light(dark_scene(), "dark.glb");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(refused.error().message,
+              AllOf(HasSubstr("dark.glb"), HasSubstr("no light"), HasSubstr("--sky"), HasSubstr("--sun")));
+}
+
+TEST(SceneLight, CountsOnlyMaterialsInUse) {
+  Scene scene = dark_scene();
+  scene.materials[1].emissive = {1, 1, 1};
+  EXPECT_FALSE(has_light(scene));
+  scene.materials[0].emissive = {0, 0, 1};
+  EXPECT_TRUE(has_light(scene));
+}
+
+TEST(SceneLight, DoesNotTakeABlackTextureForALight) {
+  Scene scene = dark_scene();
+  scene.materials[0].emissive = {1, 1, 1};
+  scene.materials[0].emissive_texture = TextureReference{0, 0};
+  scene.textures.resize(1);
+  scene.textures[0].channels = 4;
+  scene.textures[0].values = {0, 0, 0, 1, 0, 0, 0, 1};
+  EXPECT_FALSE(has_light(scene));
+  scene.textures[0].values[5] = 0.1f;
+  EXPECT_TRUE(has_light(scene));
+}
+
+TEST(SceneLight, DoesNotTakeALampThatIsOffForALight) {
+  Scene scene = dark_scene();
+  scene.lights.push_back({"off", PointLight{}});
+  EXPECT_FALSE(has_light(scene));
+  scene.lights.push_back({"on", SpotLight{{}, {0, -1, 0}, {1, 1, 1}}});
+  EXPECT_TRUE(has_light(scene));
+}
+
+TEST(SceneLight, AddsTheSkyAndTheSunOfTheCommandLine) {
+  Scene scene = dark_scene();
+  add_sky_and_sun(Vec3{1, 2, 3}, std::nullopt, scene);
+  EXPECT_EQ(scene.sky, (Vec3{1, 2, 3}));
+  EXPECT_TRUE(has_light(scene));
+  scene = dark_scene();
+  add_sky_and_sun(std::nullopt, DirectionalLight{{0, -1, 0}, {5, 5, 5}}, scene);
+  ASSERT_EQ(scene.lights.size(), 1u);
+  EXPECT_TRUE(has_light(scene));
+}
+
+}  // namespace
+}  // namespace radbake::cli

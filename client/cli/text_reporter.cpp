@@ -18,12 +18,15 @@ class TextReporter final : public Reporter {
     if (response.has_progress()) {
       show(response.progress());
     } else if (response.has_snapshot() && response.snapshot().state() < v1::SUCCEEDED) {
-      show(response.snapshot().progress());
-    } else if (response.has_event() && !response.event().message().empty()) {
-      // What a state change says beyond its name: that an attempt failed and another follows, say.
-      line_.clear();
-      std::fprintf(stderr, "%s: %s\n", stage_name(response.event().state()).c_str(),
-                   response.event().message().c_str());
+      const v1::Bake& bake = response.snapshot();
+      if (bake.has_progress()) {
+        show(bake.progress());
+      } else {
+        line_.show(stage_name(bake.state()), 0, -1);
+      }
+    } else if (response.has_event() && response.event().attempt() > 1 && response.event().state() < v1::SUCCEEDED) {
+      // Progress shows an ordinary change of state; that a bake starts again needs words.
+      note(response.event().message());
     } else if (response.has_finished()) {
       line_.clear();
     }

@@ -1,0 +1,178 @@
+#include "server/worker/result_messages.h"
+
+#include <bit>
+
+namespace radbake::worker {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "planes travel in little endian");
+
+v1::Warning to_message(const Warning& warning) {
+  v1::Warning out;
+  out.set_id(warning.id);
+  out.set_text(warning.text);
+  return out;
+}
+
+v1::Survey to_message(const radiosity::Survey& survey) {
+  v1::Survey out;
+  out.set_num_meshes(survey.num_meshes);
+  out.set_num_vertices(survey.num_vertices);
+  out.set_num_triangles(survey.num_triangles);
+  out.set_num_triangles_dropped(survey.num_triangles_dropped);
+  out.set_num_materials(survey.num_materials);
+  out.set_num_textures(survey.num_textures);
+  out.set_num_lights(survey.num_lights);
+  out.set_num_emitter_triangles(survey.num_emitter_triangles);
+  out.set_num_glowing_triangles(survey.num_glowing_triangles);
+  out.set_area_m2(survey.area_m2);
+  out.set_emitted_lumens(survey.emitted_lumens);
+  out.set_max_reflectance(survey.max_reflectance);
+  out.set_extent_m(survey.extent_m);
+  out.set_has_sky(survey.has_sky);
+  return out;
+}
+
+v1::SolverReport to_message(const radiosity::SolverSummary& solver) {
+  v1::SolverReport out;
+  out.set_solver(solver.solver);
+  out.set_status(solver.status);
+  out.set_sweeps(static_cast<std::uint32_t>(solver.sweeps));
+  out.set_residual(solver.residual);
+  out.set_error_bound(solver.error_bound);
+  out.set_relative_error_bound(solver.relative_error_bound);
+  out.set_tolerance(solver.tolerance);
+  return out;
+}
+
+v1::EnergyAudit to_message(const radiosity::EnergyAudit& energy) {
+  v1::EnergyAudit out;
+  out.set_is_closed(energy.is_closed);
+  out.set_emitted(energy.emitted);
+  out.set_absorbed(energy.absorbed);
+  out.set_gap(energy.gap);
+  out.set_gap_standard_error(energy.gap_standard_error);
+  out.set_escaped(energy.escaped);
+  out.set_transported_relative_gap(energy.transported_relative_gap);
+  out.set_mean_irradiance(energy.mean_irradiance);
+  return out;
+}
+
+v1::TransportReport to_message(const radiosity::TransportSummary& transport) {
+  v1::TransportReport out;
+  out.set_num_entries(transport.num_entries);
+  out.set_raw_reciprocity_rms(transport.raw_reciprocity_rms);
+  out.set_raw_closure_max(transport.raw_closure_max);
+  out.set_paired_row_error_rms(transport.paired_row_error_rms);
+  out.set_repaired_row_error_max(transport.repaired_row_error_max);
+  out.set_scaling_sweeps(static_cast<std::uint32_t>(transport.scaling_sweeps));
+  out.set_escape_share(transport.escape_share);
+  out.set_absorbed_share(transport.absorbed_share);
+  return out;
+}
+
+v1::LightmapReport to_message(const radiosity::LightmapSummary& lightmap) {
+  v1::LightmapReport out;
+  out.set_atlas_size(static_cast<std::uint32_t>(lightmap.atlas_size));
+  out.set_num_texels(lightmap.num_texels);
+  out.set_num_texels_filled(lightmap.num_texels_filled);
+  out.set_num_texels_dilated(lightmap.num_texels_dilated);
+  out.set_texels_per_meter(lightmap.texels_per_meter);
+  return out;
+}
+
+v1::BakeState to_state(radiosity::BakeStage stage) {
+  switch (stage) {
+    case radiosity::BakeStage::kPreparing: return v1::PREPARING;
+    case radiosity::BakeStage::kFormFactors: return v1::FORM_FACTORS;
+    case radiosity::BakeStage::kSolving: return v1::SOLVING;
+    case radiosity::BakeStage::kGathering: return v1::GATHERING;
+  }
+  return v1::PREPARING;
+}
+
+}  // namespace
+
+radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::RunOptions& run) {
+  radiosity::BakeOptions options;
+  options.atlas_size = static_cast<int>(settings.atlas_size());
+  options.texels_per_meter = settings.texels_per_meter();
+  options.rays = static_cast<int>(settings.rays());
+  options.max_patches = static_cast<int>(settings.max_patches());
+  options.seed = settings.seed();
+  options.threads = static_cast<int>(run.threads());
+  return options;
+}
+
+v1::Plan to_message(const radiosity::BakePlan& plan) {
+  v1::Plan out;
+  *out.mutable_survey() = to_message(plan.survey);
+  out.set_atlas_size(static_cast<std::uint32_t>(plan.atlas_size));
+  out.set_num_texels(plan.num_texels);
+  out.set_num_patches(plan.num_patches);
+  out.set_rays_per_texel(static_cast<std::uint64_t>(plan.rays_per_texel));
+  out.set_rays_per_row(static_cast<std::uint64_t>(plan.rays_per_row));
+  out.set_light_samples_per_texel(static_cast<std::uint64_t>(plan.light_samples_per_texel));
+  out.set_estimator(plan.estimator);
+  out.set_transport(plan.transport);
+  out.set_solver(plan.solver);
+  out.set_texels_per_meter(plan.texels_per_meter);
+  for (const Warning& warning : plan.warnings) *out.add_warnings() = to_message(warning);
+  return out;
+}
+
+v1::Progress to_message(const radiosity::BakeProgress& progress) {
+  v1::Progress out;
+  out.set_state(to_state(progress.stage));
+  out.set_fraction(progress.fraction);
+  out.set_steps_done(progress.steps_done);
+  out.set_steps_total(progress.steps_total);
+  out.set_seconds_left(progress.seconds_left);
+  out.set_residual(progress.residual);
+  return out;
+}
+
+v1::LayerTile to_message(const radiosity::Tile& tile) {
+  v1::LayerTile out;
+  out.set_layer(static_cast<std::uint32_t>(tile.layer));
+  out.set_layer_name(tile.layer_name);
+  out.set_layer_width(static_cast<std::uint32_t>(tile.layer_width));
+  out.set_layer_height(static_cast<std::uint32_t>(tile.layer_height));
+  out.set_channels(static_cast<std::uint32_t>(tile.channels));
+  out.set_pass(static_cast<std::uint32_t>(tile.pass));
+  out.set_x(static_cast<std::uint32_t>(tile.x));
+  out.set_y(static_cast<std::uint32_t>(tile.y));
+  out.set_width(static_cast<std::uint32_t>(tile.width));
+  out.set_height(static_cast<std::uint32_t>(tile.height));
+  out.set_data(tile.values.data(), tile.values.size() * sizeof(float));
+  return out;
+}
+
+v1::Layer to_message(const radiosity::Layer& layer) {
+  v1::Layer out;
+  out.set_name(layer.name);
+  out.set_quantity(layer.quantity);
+  out.set_unit(layer.unit);
+  out.set_width(static_cast<std::uint32_t>(layer.width));
+  out.set_height(static_cast<std::uint32_t>(layer.height));
+  out.set_channels(static_cast<std::uint32_t>(layer.channels));
+  return out;
+}
+
+v1::BakeReport to_message(const radiosity::BakeReport& report) {
+  v1::BakeReport out;
+  out.set_instruction_set(report.instruction_set);
+  *out.mutable_plan() = to_message(report.plan);
+  out.set_num_patches(report.num_patches);
+  out.set_num_row_rays(report.num_row_rays);
+  out.set_num_gather_rays(report.num_gather_rays);
+  out.set_num_light_rays(report.num_light_rays);
+  *out.mutable_solver() = to_message(report.solver);
+  *out.mutable_energy() = to_message(report.energy);
+  *out.mutable_transport() = to_message(report.transport);
+  *out.mutable_lightmap() = to_message(report.lightmap);
+  for (const Warning& warning : report.warnings) *out.add_warnings() = to_message(warning);
+  return out;
+}
+
+}  // namespace radbake::worker

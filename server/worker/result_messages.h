@@ -1,0 +1,23 @@
+#pragma once
+
+#include "radbake/v1/bake.pb.h"
+#include "radbake/v1/plan.pb.h"
+#include "radbake/v1/result.pb.h"
+#include "radbake/v1/settings.pb.h"
+#include "server/radiosity/bake/bake.h"
+
+namespace radbake::worker {
+
+/// The library's plain structs to and from the wire, field for field.
+
+radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::RunOptions& run);
+
+v1::Plan to_message(const radiosity::BakePlan& plan);
+v1::Progress to_message(const radiosity::BakeProgress& progress);
+v1::LayerTile to_message(const radiosity::Tile& tile);
+/// Without the blob, which is named when it has been sent.
+v1::Layer to_message(const radiosity::Layer& layer);
+/// Without the engine's version and without `run`, which the library does not know.
+v1::BakeReport to_message(const radiosity::BakeReport& report);
+
+}  // namespace radbake::worker

@@ -1,0 +1,207 @@
+#include "server/worker/run_worker.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <new>
+#include <span>
+#include <thread>
+#include <utility>
+
+#include "common/base/digest.h"
+#include "common/base/limits.h"
+#include "common/base/version.h"
+#include "common/codec/scene_codec.h"
+#include "server/worker/input_blobs.h"
+#include "server/worker/report_stream.h"
+#include "server/worker/result_messages.h"
+#include "server/worker/status_message.h"
+
+namespace radbake::worker {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Passes on what a bake tells.
+class StreamObserver : public radiosity::BakeObserver {
+ public:
+  explicit StreamObserver(ReportStream& stream) : stream_(stream) {}
+
+  void on_progress(const radiosity::BakeProgress& progress) override {
+    latest_ = to_message(progress);
+    stream_.set_progress(latest_);
+  }
+  void on_tile(const radiosity::Tile& tile) override {
+    v1::WorkerReport report;
+    *report.mutable_tile() = to_message(tile);
+    stream_.send(std::move(report));  // a server that is gone stops the bake by its token
+  }
+  /// The last progress of the bake; read it when the bake has returned.
+  const v1::Progress& latest() const { return latest_; }
+
+ private:
+  ReportStream& stream_;
+  v1::Progress latest_;
+};
+
+/// Decodes the scene of an order.
+Result<Scene> read_scene(const v1::StartWork& start) {
+  const InputBlobs inputs(start);
+  const Digest manifest{start.manifest().sha256(), start.manifest().size_bytes()};
+  if (manifest.size_bytes > start.limits().max_manifest_bytes()) {
+    return Error{ErrorCode::kResourceExhausted, "the scene manifest has " + std::to_string(manifest.size_bytes) +
+                                                    " bytes; max_manifest_bytes is " +
+                                                    std::to_string(start.limits().max_manifest_bytes())};
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const std::string bytes, inputs.read(manifest));
+  return decode_scene(
+      bytes, [&](const Digest& digest) { return inputs.read(digest); }, start.limits());
+}
+
+std::uint64_t chunk_bytes_of(const v1::Limits& limits) {
+  return limits.chunk_bytes() > 0 ? limits.chunk_bytes() : Limits{}.chunk_bytes;
+}
+
+Error server_gone() { return {ErrorCode::kUnavailable, "the server is gone"}; }
+
+/// Sends a layer's plane in parts, and returns the layer with its blob named.
+Result<v1::Layer> send_layer(const radiosity::Layer& layer, std::uint64_t chunk_bytes, ReportStream& stream,
+                             const std::function<void(std::uint64_t)>& on_sent) {
+  const auto bytes = std::as_bytes(std::span(layer.values));
+  const Digest digest = digest_of(bytes);
+  v1::Layer message = to_message(layer);
+  message.mutable_blob()->set_sha256(digest.sha256);
+  message.mutable_blob()->set_size_bytes(digest.size_bytes);
+  std::uint64_t offset = 0;
+  do {
+    const auto part = bytes.subspan(offset, std::min<std::uint64_t>(chunk_bytes, bytes.size() - offset));
+    v1::WorkerReport report;
+    v1::ResultBlobChunk& chunk = *report.mutable_chunk();
+    chunk.set_blob(layer.name);
+    chunk.set_offset(offset);
+    chunk.set_data(part.data(), part.size());
+    offset += part.size();
+    if (offset == bytes.size()) {
+      chunk.set_finish(true);
+      *chunk.mutable_digest() = message.blob();
+    }
+    if (!stream.send(std::move(report))) return server_gone();
+    on_sent(part.size());
+  } while (offset < bytes.size());
+  return message;
+}
+
+/// Sends all layers, under the state WRITING.
+Result<v1::BakeResult> send_layers(const std::vector<radiosity::Layer>& layers, v1::Progress progress,
+                                   std::uint64_t chunk_bytes, ReportStream& stream) {
+  std::uint64_t total = 0, sent = 0;
+  for (const radiosity::Layer& layer : layers) total += layer.values.size() * sizeof(float);
+  const auto report_sent = [&](std::uint64_t bytes) {
+    sent += bytes;
+    progress.set_state(v1::WRITING);
+    progress.set_steps_done(sent);
+    progress.set_steps_total(total);
+    stream.set_progress(progress);
+  };
+  report_sent(0);
+  v1::BakeResult result;
+  for (const radiosity::Layer& layer : layers) {
+    RADBAKE_ASSIGN_OR_RETURN(*result.add_layers(), send_layer(layer, chunk_bytes, stream, report_sent));
+  }
+  return result;
+}
+
+Result<v1::WorkerReport> plan(const v1::StartWork& start, ReportStream& stream) {
+  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
+  RADBAKE_ASSIGN_OR_RETURN(
+      const radiosity::BakePlan planned,
+      radiosity::plan_scene(scene, to_options(start.settings(), start.run()), stream.stop_token()));
+  v1::WorkerReport report;
+  *report.mutable_plan_finished() = to_message(planned);
+  return report;
+}
+
+Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
+  const auto began_at = Clock::now();
+  StageClock before, after;
+  before.begin("decoding");
+  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
+  before.end();
+
+  const radiosity::BakeOptions options = to_options(start.settings(), start.run());
+  StreamObserver observer(stream);
+  const auto bake_began_at = Clock::now();
+  RADBAKE_ASSIGN_OR_RETURN(const radiosity::BakeOutcome outcome,
+                           radiosity::bake_scene(scene, options, observer, stream.stop_token()));
+  const double bake_seconds = seconds_since(bake_began_at);
+
+  after.begin("writing");
+  RADBAKE_ASSIGN_OR_RETURN(v1::BakeResult result,
+                           send_layers(outcome.layers, observer.latest(), chunk_bytes_of(start.limits()), stream));
+  after.end();
+
+  // Complete the report with what the library does not know.
+  std::vector<radiosity::StageTime> stages = before.stages();
+  stages.insert(stages.end(), outcome.report.stages.begin(), outcome.report.stages.end());
+  stages.insert(stages.end(), after.stages().begin(), after.stages().end());
+  const auto threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
+  v1::BakeReport& report = *result.mutable_report();
+  report = to_message(outcome.report);
+  report.set_engine_version(kEngineVersion);
+  *report.mutable_run() = run_report(identity, stages, seconds_since(began_at), static_cast<std::uint32_t>(threads));
+  const std::uint64_t num_rays = report.num_row_rays() + report.num_gather_rays() + report.num_light_rays();
+  report.mutable_run()->set_rays_per_second(static_cast<double>(num_rays) / bake_seconds);
+  v1::WorkerReport finished;
+  *finished.mutable_bake_finished() = std::move(result);
+  return finished;
+}
+
+/// Does the work; nothing that it throws gets further.
+Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
+  try {
+    return start.plan_only() ? plan(start, stream) : bake(start, identity, stream);
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kResourceExhausted, "the bake needs more memory than its worker may use"};
+  } catch (const std::exception& exception) {
+    return internal_error(std::string("the worker failed: ") + exception.what());
+  }
+}
+
+}  // namespace
+
+int run_worker(const std::shared_ptr<grpc::Channel>& channel, const WorkerIdentity& identity) {
+  v1::WorkerHello hello;
+  hello.set_job(identity.job);
+  hello.set_attempt(identity.attempt);
+  hello.set_engine_version(kEngineVersion);
+  hello.set_protocol_major(kProtocolMajor);
+  ReportStream stream(channel, hello);
+  const auto start = stream.wait_for_start();
+  if (!start) {
+    spdlog::error("{} attempt {}: the server ended the connection before it sent work", identity.job, identity.attempt);
+    return kExitServerGone;
+  }
+
+  auto done = work(*start, identity, stream);
+  v1::WorkerReport outcome;
+  if (done.ok()) {
+    outcome = std::move(done).value();
+  } else if (done.error().code == ErrorCode::kCancelled) {
+    *outcome.mutable_cancelled() = to_message(done.error());
+  } else {
+    spdlog::warn("{} attempt {} failed: {}", identity.job, identity.attempt, done.error().message);
+    *outcome.mutable_failed() = to_message(done.error());
+  }
+  if (!stream.finish(std::move(outcome))) {
+    spdlog::error("{} attempt {}: the server went before it had stored the outcome", identity.job, identity.attempt);
+    return kExitServerGone;
+  }
+  return kExitDone;
+}
+
+}  // namespace radbake::worker

@@ -1,0 +1,154 @@
+#include "server/worker/result_messages.h"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+#include <grpcpp/support/status_code_enum.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "server/worker/status_message.h"
+
+namespace radbake::worker {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+
+/// Names of all fields, down to the leaves, that hold their default.
+void collect_unset(const Message& message, const std::string& prefix, std::vector<std::string>& unset) {
+  const auto& reflection = *message.GetReflection();
+  std::vector<const FieldDescriptor*> set_fields;
+  reflection.ListFields(message, &set_fields);
+  for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
+    const FieldDescriptor* field = message.GetDescriptor()->field(i);
+    const std::string name = prefix + field->name();
+    if (std::find(set_fields.begin(), set_fields.end(), field) == set_fields.end()) {
+      unset.push_back(name);
+    } else if (field->is_repeated() && field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      collect_unset(reflection.GetRepeatedMessage(message, field, 0), name + ".", unset);
+    } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      collect_unset(reflection.GetMessage(message, field), name + ".", unset);
+    }
+  }
+}
+
+std::vector<std::string> unset_fields(const Message& message) {
+  std::vector<std::string> unset;
+  collect_unset(message, "", unset);
+  return unset;
+}
+
+radiosity::BakePlan full_plan() {
+  radiosity::BakePlan plan;
+  plan.survey = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10.5, 11.5, 0.5, 13.5, true};
+  plan.atlas_size = 14;
+  plan.num_texels = 15;
+  plan.num_patches = 16;
+  plan.rays_per_texel = 17;
+  plan.rays_per_row = 18;
+  plan.light_samples_per_texel = 19;
+  plan.estimator = "hemisphere";
+  plan.transport = "sparse";
+  plan.solver = "gauss-seidel";
+  plan.texels_per_meter = 20.5;
+  plan.warnings = {{"plan_warning", "of the plan"}};
+  return plan;
+}
+
+TEST(ResultMessages, SetEveryFieldOfAPlan) {
+  const v1::Plan plan = to_message(full_plan());
+  EXPECT_THAT(unset_fields(plan), ::testing::IsEmpty());
+  EXPECT_EQ(plan.survey().num_glowing_triangles(), 9U);
+  EXPECT_EQ(plan.survey().extent_m(), 13.5);
+  EXPECT_EQ(plan.rays_per_texel(), 17U);
+  EXPECT_EQ(plan.rays_per_row(), 18U);
+  EXPECT_EQ(plan.light_samples_per_texel(), 19U);
+  EXPECT_EQ(plan.warnings(0).id(), "plan_warning");
+}
+
+TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
+  radiosity::BakeReport report;
+  report.instruction_set = "avx2";
+  report.plan = full_plan();
+  report.num_patches = 21;
+  report.num_row_rays = 22;
+  report.num_gather_rays = 23;
+  report.num_light_rays = 24;
+  report.solver = {"gauss-seidel", "converged", 25, 26.5, 27.5, 28.5, 29.5};
+  report.energy = {true, 30.5, 31.5, 32.5, 33.5, 34.5, 35.5, 36.5};
+  report.transport = {37, 38.5, 39.5, 40.5, 41.5, 42, 43.5, 44.5};
+  report.lightmap = {45, 46, 47, 48, 49.5};
+  report.warnings = {{"bake_warning", "of the bake"}};
+  const v1::BakeReport message = to_message(report);
+  EXPECT_THAT(unset_fields(message), ::testing::ElementsAre("engine_version", "run"));
+  EXPECT_EQ(message.num_light_rays(), 24U);
+  EXPECT_EQ(message.solver().sweeps(), 25U);
+  EXPECT_EQ(message.solver().tolerance(), 29.5);
+  EXPECT_EQ(message.energy().emitted(), 30.5);
+  EXPECT_EQ(message.energy().mean_irradiance(), 36.5);
+  EXPECT_EQ(message.transport().num_entries(), 37U);
+  EXPECT_EQ(message.transport().absorbed_share(), 44.5);
+  EXPECT_EQ(message.lightmap().num_texels_dilated(), 48U);
+  EXPECT_EQ(message.warnings(0).text(), "of the bake");
+}
+
+TEST(ResultMessages, SetEveryFieldOfProgressTileAndLayer) {
+  radiosity::BakeProgress progress{radiosity::BakeStage::kSolving, 0.5, 3, 4, 5.5, 6.5};
+  EXPECT_THAT(unset_fields(to_message(progress)), ::testing::IsEmpty());
+  EXPECT_EQ(to_message(progress).state(), v1::SOLVING);
+  EXPECT_EQ(to_message(progress).seconds_left(), 5.5);
+
+  radiosity::Tile tile{1, 2, 3, 4, 2, 1, 4, {0, 1, 2, 3, 4, 5, 6, 7}};
+  tile.layer_name = "lightmap_1";
+  tile.layer_width = 64;
+  tile.layer_height = 32;
+  const v1::LayerTile message = to_message(tile);
+  EXPECT_THAT(unset_fields(message), ::testing::IsEmpty());
+  EXPECT_EQ(message.pass(), 2U);
+  EXPECT_EQ(message.x(), 3U);
+  EXPECT_EQ(message.layer_height(), 32U);
+  EXPECT_EQ(message.data().size(), 32U);
+
+  const radiosity::Layer layer{"lightmap_0", "irradiance", "lx", 64, 32, 4, {}};
+  EXPECT_THAT(unset_fields(to_message(layer)), ::testing::ElementsAre("blob"));
+  EXPECT_EQ(to_message(layer).height(), 32U);
+}
+
+TEST(ResultMessages, ReadEverySetting) {
+  v1::BakeSettings settings;
+  settings.set_atlas_size(256);
+  settings.set_texels_per_meter(16.5);
+  settings.set_rays(512);
+  settings.set_max_patches(1000);
+  settings.set_seed(0xffffffffffffffff);
+  v1::RunOptions run;
+  run.set_threads(3);
+  const radiosity::BakeOptions options = to_options(settings, run);
+  EXPECT_EQ(options.atlas_size, 256);
+  EXPECT_EQ(options.texels_per_meter, 16.5);
+  EXPECT_EQ(options.rays, 512);
+  EXPECT_EQ(options.max_patches, 1000);
+  EXPECT_EQ(options.seed, 0xffffffffffffffff);
+  EXPECT_EQ(options.threads, 3);
+}
+
+TEST(StatusMessage, HasTheCodeOfTheSameName) {
+  const auto code_of = [](ErrorCode code) { return to_message(Error{code, "text"}).code(); };
+  EXPECT_EQ(code_of(ErrorCode::kInvalidArgument), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(code_of(ErrorCode::kNotFound), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(code_of(ErrorCode::kAlreadyExists), grpc::StatusCode::ALREADY_EXISTS);
+  EXPECT_EQ(code_of(ErrorCode::kFailedPrecondition), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(code_of(ErrorCode::kResourceExhausted), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(code_of(ErrorCode::kDataLoss), grpc::StatusCode::DATA_LOSS);
+  EXPECT_EQ(code_of(ErrorCode::kUnavailable), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(code_of(ErrorCode::kCancelled), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(code_of(ErrorCode::kInternal), grpc::StatusCode::INTERNAL);
+  EXPECT_EQ(to_message(Error{ErrorCode::kInternal, "text"}).message(), "text");
+}
+
+}  // namespace
+}  // namespace radbake::worker

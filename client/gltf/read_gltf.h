@@ -21,8 +21,8 @@ struct ReadOptions {
 };
 
 struct GltfScene {
-  Scene scene;                    ///< in world space: instances, transforms and mirrors are applied
-  std::vector<Warning> warnings;  ///< what was limited, dropped, or read and is not simulated, with its share of the area
+  Scene scene;                              ///< in world space: instances, transforms and mirrors are applied
+  std::vector<Warning> warnings;            ///< what was limited, dropped or not simulated, with its share of the area
   std::uint64_t num_triangles_dropped = 0;  ///< of zero area
 };
 

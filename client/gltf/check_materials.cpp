@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <array>
+
+#include "client/gltf/check_document.h"
+
+namespace radbake::gltf {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kHalfPi = 1.5707963267948966;
+// Largest emissiveStrength and intensity: far above the sun's surface (1.6e9 nit), and no product overflows.
+constexpr double kMaxStrength = 1e12;
+
+Result<void> check_texture(const Entry& owner, const char* key, std::size_t num_textures) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> info, owner.member(key));
+  if (!info) return {};
+  RADBAKE_RETURN_IF_ERROR(info->required_whole_number("index"));
+  RADBAKE_RETURN_IF_ERROR(info->index("index", num_textures, "textures"));
+  return info->whole_number("texCoord").ok() ? Result<void>() : info->error("texCoord is not a whole number >= 0");
+}
+
+Result<void> check_material(const Entry& material, std::size_t num_textures) {
+  RADBAKE_RETURN_IF_ERROR(material.text("name"));
+  RADBAKE_RETURN_IF_ERROR(material.flag("doubleSided"));
+  RADBAKE_RETURN_IF_ERROR(material.numbers("emissiveFactor", 3, 0, kMaxStrength));
+  RADBAKE_RETURN_IF_ERROR(material.number("alphaCutoff", 0, kMaxStrength));
+  RADBAKE_RETURN_IF_ERROR(material.text("alphaMode"));
+  if (const json* mode = material.find("alphaMode")) {
+    const std::string name = mode->get<std::string>();
+    if (name != "OPAQUE" && name != "MASK" && name != "BLEND") return material.error("alphaMode is " + in_quotes(name));
+  }
+  for (const char* key : {"normalTexture", "occlusionTexture", "emissiveTexture"}) {
+    RADBAKE_RETURN_IF_ERROR(check_texture(material, key, num_textures));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> pbr, material.member("pbrMetallicRoughness"));
+  if (pbr) {
+    RADBAKE_RETURN_IF_ERROR(pbr->numbers("baseColorFactor", 4, 0, kMaxStrength));
+    RADBAKE_RETURN_IF_ERROR(pbr->number("metallicFactor", 0, 1));
+    RADBAKE_RETURN_IF_ERROR(check_texture(*pbr, "baseColorTexture", num_textures));
+    RADBAKE_RETURN_IF_ERROR(check_texture(*pbr, "metallicRoughnessTexture", num_textures));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const auto strength, material.extension("KHR_materials_emissive_strength"));
+  if (strength) RADBAKE_RETURN_IF_ERROR(strength->number("emissiveStrength", 0, kMaxStrength));
+  RADBAKE_ASSIGN_OR_RETURN(const auto transmission, material.extension("KHR_materials_transmission"));
+  if (transmission) RADBAKE_RETURN_IF_ERROR(transmission->number("transmissionFactor", 0, 1));
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_materials(const Entry& root) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> images, root.list("images", "image"));
+  for (const Entry& image : images) {
+    RADBAKE_RETURN_IF_ERROR(image.text("uri"));
+    RADBAKE_ASSIGN_OR_RETURN(const auto view,
+                             image.index("bufferView", list_size(root, "bufferViews"), "buffer views"));
+    if (view.has_value() == (image.find("uri") != nullptr)) {
+      return image.error("it needs either a uri or a bufferView");
+    }
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> samplers, root.list("samplers", "sampler"));
+  for (const Entry& sampler : samplers) {
+    for (const char* key : {"wrapS", "wrapT"}) {
+      RADBAKE_ASSIGN_OR_RETURN(const auto mode, sampler.whole_number(key));
+      if (mode && *mode != 10497 && *mode != 33071 && *mode != 33648) {
+        return sampler.error(std::string(key) + " is " + std::to_string(*mode) + ", which glTF does not know");
+      }
+    }
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> textures, root.list("textures", "texture"));
+  for (const Entry& texture : textures) {
+    RADBAKE_RETURN_IF_ERROR(texture.index("sampler", samplers.size(), "samplers"));
+    RADBAKE_RETURN_IF_ERROR(texture.index("source", images.size(), "images"));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> materials, root.list("materials", "material"));
+  for (const Entry& material : materials) RADBAKE_RETURN_IF_ERROR(check_material(material, textures.size()));
+  return {};
+}
+
+Result<void> check_lights(const Entry& root) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> extension, root.extension("KHR_lights_punctual"));
+  if (!extension) return {};
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> lights, extension->list("lights", "light"));
+  for (const Entry& light : lights) {
+    RADBAKE_RETURN_IF_ERROR(light.numbers("color", 3, 0, kMaxStrength));
+    RADBAKE_RETURN_IF_ERROR(light.number("intensity", 0, kMaxStrength));
+    RADBAKE_RETURN_IF_ERROR(light.text("type"));
+    const json* type = light.find("type");
+    const std::string name = type == nullptr ? "" : type->get<std::string>();
+    if (name != "point" && name != "spot" && name != "directional") return light.error("type is " + in_quotes(name));
+    if (name != "spot") continue;
+    RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> spot, light.member("spot"));
+    if (!spot) return light.error("a spot light without its spot object");
+    // The specification bounds the cone by a half space; exporters round pi / 2 to float.
+    RADBAKE_RETURN_IF_ERROR(spot->number("innerConeAngle", 0, kHalfPi * (1 + 1e-6)));
+    RADBAKE_RETURN_IF_ERROR(spot->number("outerConeAngle", 0, kHalfPi * (1 + 1e-6)));
+  }
+  return {};
+}
+
+}  // namespace radbake::gltf

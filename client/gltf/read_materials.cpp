@@ -1,0 +1,192 @@
+#include "client/gltf/read_materials.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "client/gltf/entry.h"
+
+namespace radbake::gltf {
+namespace {
+
+// A texture of 8 bits cannot say less than this.
+constexpr double kSmallestMetallic = 1.0 / 255;
+
+const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name) {
+  const auto it = extensions.find(name);
+  return it == extensions.end() ? nullptr : &it->second;
+}
+
+double number(const tinygltf::Value* object, const char* key, double otherwise) {
+  return object != nullptr && object->Has(key) ? object->Get(key).GetNumberAsDouble() : otherwise;
+}
+
+Wrap wrap_of(int mode) {
+  if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::kClamp;
+  return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirror : Wrap::kRepeat;
+}
+
+AlphaMode alpha_mode_of(const std::string& mode) {
+  return mode == "MASK" ? AlphaMode::kMask : mode == "BLEND" ? AlphaMode::kBlend : AlphaMode::kOpaque;
+}
+
+Result<TextureReference> reference(const char* key, int texcoord) {
+  if (texcoord < 0 || texcoord > 1) {
+    return invalid_argument(std::string(key) + ": texCoord is " + std::to_string(texcoord) + "; only 0 and 1 are read");
+  }
+  return TextureReference{0, texcoord};
+}
+
+// A decoder is injected: a plane that is not one would crash us later.
+std::string fault_of(const TexturePlane& plane) {
+  if (plane.width <= 0 || plane.height <= 0 || plane.channels < 3 || plane.channels > 4 ||
+      plane.values.size() != std::size_t(plane.width) * std::size_t(plane.height) * std::size_t(plane.channels)) {
+    return "its decoded size is impossible";
+  }
+  const bool is_fine = std::all_of(plane.values.begin(), plane.values.end(),
+                                   [](float value) { return value >= 0 && std::isfinite(value); });
+  return is_fine ? "" : "it holds a value that is negative or not finite";
+}
+
+}  // namespace
+
+Result<const TexturePlane*> MaterialReader::decoded(int index, bool is_srgb) {
+  if (const auto it = images_.find({index, is_srgb}); it != images_.end()) return &it->second;
+  const tinygltf::Texture& texture = model_.textures[index];
+  const std::string texture_name = numbered("texture", static_cast<std::size_t>(index), texture.name);
+  if (texture.source < 0) return invalid_argument(texture_name + " has no image of a kind that this version reads");
+  const tinygltf::Image& image = model_.images[texture.source];
+  const std::string label = image.name.empty() ? image.uri : image.name;
+  const std::string name = numbered("image", static_cast<std::size_t>(texture.source), label);
+  if (image.image.empty()) return invalid_argument(name + ": the image file is missing or empty");
+  Result<TexturePlane> plane = decode_image_(std::as_bytes(std::span(image.image)), name, is_srgb);
+  if (!plane.ok()) return invalid_argument(name + ": " + plane.error().message);
+  if (const std::string fault = fault_of(*plane); !fault.empty()) return invalid_argument(name + ": " + fault);
+  plane->name = label.empty() ? "image" + std::to_string(texture.source) : printable(label);
+  if (texture.sampler >= 0) {
+    plane->wrap_s = wrap_of(model_.samplers[texture.sampler].wrapS);
+    plane->wrap_t = wrap_of(model_.samplers[texture.sampler].wrapT);
+  }
+  return &images_.emplace(std::pair(index, is_srgb), std::move(plane).value()).first->second;
+}
+
+Result<int> MaterialReader::scene_texture(const PlaneUse& use) {
+  const std::array<double, 8> key = {double(use.texture), use.ratio.x, use.ratio.y, use.ratio.z,
+                                     use.bound.x,         use.bound.y, use.bound.z, double(use.keeps_opacity)};
+  if (const auto it = scene_textures_.find(key); it != scene_textures_.end()) return it->second;
+  RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* source, decoded(use.texture, true));
+  TexturePlane plane = *source;
+  plane.channels = use.keeps_opacity ? source->channels : 3;
+  plane.values.clear();
+  plane.values.reserve(std::size_t(plane.width) * std::size_t(plane.height) * std::size_t(plane.channels));
+  for (std::size_t at = 0; at < source->values.size(); at += std::size_t(source->channels)) {
+    for (int c = 0; c < 3; ++c) {
+      float value = static_cast<float>(source->values[at + c] * use.ratio[c]);
+      // Rounding to float must not lift a value over its bound.
+      if (use.bound[c] > 0 && value > use.bound[c]) value = std::nextafter(static_cast<float>(use.bound[c]), 0.0f);
+      plane.values.push_back(value);
+    }
+    if (plane.channels == 4) plane.values.push_back(source->values[at + 3]);
+  }
+  textures_.push_back(std::move(plane));
+  const int index = static_cast<int>(textures_.size()) - 1;
+  scene_textures_[key] = index;
+  return index;
+}
+
+Result<void> MaterialReader::read_reflectance(const tinygltf::Material& source, Material& material,
+                                              MaterialFacts& facts) {
+  const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
+  const Vec3 factor{pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]};
+  const double limit = options_.max_reflectance;
+  material.alpha = pbr.baseColorFactor[3];
+  material.alpha_mode = alpha_mode_of(source.alphaMode);
+  material.alpha_cutoff = source.alphaCutoff;
+  double lowest_alpha = material.alpha;
+  material.reflectance = {std::fmin(factor.x, limit), std::fmin(factor.y, limit), std::fmin(factor.z, limit)};
+  if (pbr.baseColorTexture.index < 0) {
+    facts.limited_share = max_component(factor) > limit ? 1 : 0;
+  } else {
+    RADBAKE_ASSIGN_OR_RETURN(material.reflectance_texture,
+                             reference("baseColorTexture", pbr.baseColorTexture.texCoord));
+    RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* plane, decoded(pbr.baseColorTexture.index, true));
+    // Count the texels that are too bright, and find the most transparent one.
+    std::size_t num_limited = 0;
+    for (std::size_t at = 0; at < plane->values.size(); at += std::size_t(plane->channels)) {
+      const float* texel = &plane->values[at];
+      if (max_component(scaled_by(factor, {texel[0], texel[1], texel[2]})) > limit) ++num_limited;
+      if (plane->channels == 4) lowest_alpha = std::fmin(lowest_alpha, material.alpha * texel[3]);
+    }
+    facts.limited_share = double(num_limited) / (double(plane->width) * plane->height);
+    PlaneUse use;
+    use.texture = pbr.baseColorTexture.index;
+    use.keeps_opacity = material.alpha_mode != AlphaMode::kOpaque;
+    for (int c = 0; c < 3; ++c) {
+      if (material.reflectance[c] > 0) use.ratio[c] = factor[c] / material.reflectance[c];
+      if (material.reflectance[c] > 0 && num_limited > 0) use.bound[c] = limit / material.reflectance[c];
+    }
+    RADBAKE_ASSIGN_OR_RETURN(material.reflectance_texture->texture, scene_texture(use));
+  }
+  const double opaque_from = material.alpha_mode == AlphaMode::kMask ? material.alpha_cutoff : 1;
+  facts.is_translucent = material.alpha_mode != AlphaMode::kOpaque && lowest_alpha < opaque_from;
+  return {};
+}
+
+Result<void> MaterialReader::read_emission(const tinygltf::Material& source, Material& material) {
+  for (int c = 0; c < 3 && !source.emissiveFactor.empty(); ++c) material.emissive[c] = source.emissiveFactor[c];
+  material.emissive *= number(extension(source.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
+  if (source.emissiveTexture.index < 0 || max_component(material.emissive) == 0) return {};
+  RADBAKE_ASSIGN_OR_RETURN(material.emissive_texture, reference("emissiveTexture", source.emissiveTexture.texCoord));
+  RADBAKE_ASSIGN_OR_RETURN(material.emissive_texture->texture,
+                           scene_texture({.texture = source.emissiveTexture.index}));
+  return {};
+}
+
+bool MaterialReader::is_metallic(const tinygltf::Material& source) {
+  const double factor = source.pbrMetallicRoughness.metallicFactor;
+  const int texture = source.pbrMetallicRoughness.metallicRoughnessTexture.index;
+  if (factor <= 0 || texture < 0) return factor > 0;
+  // Metalness is in the blue channel. A texture that does not decode may say anything: it only costs a warning.
+  const Result<const TexturePlane*> plane = decoded(texture, false);
+  if (!plane.ok()) return true;
+  float highest = 0;
+  for (std::size_t at = 0; at < (*plane)->values.size(); at += std::size_t((*plane)->channels)) {
+    highest = std::max(highest, (*plane)->values[at + 2]);
+  }
+  return factor * highest >= kSmallestMetallic;
+}
+
+Result<void> MaterialReader::read(const tinygltf::Material& source, Material& material, MaterialFacts& facts) {
+  RADBAKE_RETURN_IF_ERROR(read_reflectance(source, material, facts));
+  RADBAKE_RETURN_IF_ERROR(read_emission(source, material));
+  material.is_double_sided = source.doubleSided;
+  facts.is_metallic = is_metallic(source);
+  facts.is_transmissive =
+      number(extension(source.extensions, "KHR_materials_transmission"), "transmissionFactor", 0) > 0;
+  facts.has_normal_map = source.normalTexture.index >= 0;
+  facts.is_unlit = extension(source.extensions, "KHR_materials_unlit") != nullptr;
+  return {};
+}
+
+Result<int> MaterialReader::scene_material(int index) {
+  if (const auto it = scene_materials_.find(index); it != scene_materials_.end()) return it->second;
+  const tinygltf::Material standard;
+  const tinygltf::Material& source = index < 0 ? standard : model_.materials[index];
+  Material material;
+  MaterialFacts facts;
+  const Result<void> is_read = read(source, material, facts);
+  if (!is_read.ok()) {
+    return invalid_argument(numbered("material", static_cast<std::size_t>(index), source.name) + ": " +
+                            is_read.error().message);
+  }
+  material.name = index < 0             ? "glTF's default material"
+                  : source.name.empty() ? "material" + std::to_string(index)
+                                        : printable(source.name);
+  materials_.push_back(std::move(material));
+  facts_.push_back(facts);
+  const int scene_index = static_cast<int>(materials_.size()) - 1;
+  scene_materials_[index] = scene_index;
+  return scene_index;
+}
+
+}  // namespace radbake::gltf

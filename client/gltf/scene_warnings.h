@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "client/gltf/read_materials.h"
+#include "common/scene/scene.h"
+
+namespace radbake::gltf {
+
+/// What reading a scene counted and its warnings tell.
+struct ReadCounts {
+  std::vector<double> area_m2;              ///< of each material of the scene, one side
+  std::uint64_t num_triangles_dropped = 0;  ///< of zero area
+  std::uint64_t num_points_and_lines = 0;   ///< primitives, with every instance
+  std::uint64_t num_strips_and_fans = 0;
+  std::uint64_t num_skinned = 0;
+  double morphed_area_m2 = 0;         ///< of meshes whose morph targets have weights
+  double vertex_colored_area_m2 = 0;  ///< of meshes with COLOR_0
+  double renormaled_area_m2 = 0;      ///< of meshes where unusable normals were replaced
+  double total_area_m2 = 0;
+};
+
+/// Warnings in a fixed order, each with its share of the scene's area where it has one.
+std::vector<Warning> scene_warnings(std::span<const Material> materials, std::span<const MaterialFacts> facts,
+                                    const ReadCounts& counts, const std::vector<std::string>& ignored_extensions,
+                                    const ReadOptions& options);
+
+/// "'red', 'white' and 3 more": at most three names.
+std::string some_of(const std::vector<std::string>& names);
+
+}  // namespace radbake::gltf

@@ -1,0 +1,137 @@
+#include "client/image/write_image.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <fstream>
+#include <system_error>
+
+#include "client/image/oiio_setup.h"
+#include "client/image/srgb.h"
+
+namespace radbake::image {
+namespace {
+
+constexpr double kExposedPercentile = 0.95;
+constexpr double kWhite = 4;
+
+Error cannot_write(const std::filesystem::path& path, const std::string& why) {
+  return internal_error("cannot write " + path.string() + ": " + why);
+}
+
+Result<void> check_shape(const std::filesystem::path& path, int width, int height, int channels, int fewest,
+                         std::size_t num_values) {
+  if (width > 0 && height > 0 && channels >= fewest && channels <= 4 &&
+      num_values == std::size_t(width) * std::size_t(height) * std::size_t(channels)) {
+    return {};
+  }
+  return invalid_argument("cannot write " + path.string() + ": " + std::to_string(num_values) +
+                          " values are no image of " + std::to_string(width) + " x " + std::to_string(height) +
+                          " with " + std::to_string(channels) + " channels");
+}
+
+// Writes aside and renames, so that nobody sees half a file.
+Result<void> write_file(const std::filesystem::path& path, const std::vector<unsigned char>& bytes) {
+  const std::filesystem::path aside = path.string() + "." + std::to_string(getpid()) + ".part";
+  std::ofstream file(aside, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  std::error_code error;
+  if (file) std::filesystem::rename(aside, path, error);
+  if (file && !error) return {};
+  const std::string why = error ? error.message() : "the disk is full, or the folder is missing or write-protected";
+  std::filesystem::remove(aside, error);
+  return cannot_write(path, why);
+}
+
+// Encodes in memory, with the format that the path's extension names.
+Result<void> encode(const std::filesystem::path& path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+                    const void* pixels) {
+  try {
+    set_up_oiio();
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    const std::string name = path.filename().string();
+    const auto output = OIIO::ImageOutput::create(name, &memory);
+    if (!output) return cannot_write(path, OIIO::geterror());
+    if (!output->open(name, spec) || !output->write_image(type, pixels) || !output->close()) {
+      return cannot_write(path, output->geterror());
+    }
+    return write_file(path, bytes);
+  } catch (const std::exception& error) {
+    return cannot_write(path, error.what());
+  }
+}
+
+double luminance(const float* rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+
+// What the preview shows as 1. The brightest texel where the percentile is dark.
+double exposed_luminance(std::span<const float> values, int channels) {
+  std::vector<double> covered;
+  for (std::size_t at = 0; at < values.size(); at += std::size_t(channels)) {
+    if (channels == 4 && !(values[at + 3] > 0)) continue;
+    const double y = luminance(&values[at]);
+    if (std::isfinite(y)) covered.push_back(y);
+  }
+  if (covered.empty()) return 0;
+  const auto rank = covered.begin() + std::ptrdiff_t(kExposedPercentile * double(covered.size() - 1));
+  std::nth_element(covered.begin(), rank, covered.end());
+  return *rank > 0 ? *rank : *std::max_element(covered.begin(), covered.end());
+}
+
+}  // namespace
+
+Result<void> write_exr(const std::filesystem::path& path, int width, int height, int channels,
+                       std::span<const float> values) {
+  RADBAKE_RETURN_IF_ERROR(check_shape(path, width, height, channels, 1, values.size()));
+  OIIO::ImageSpec spec(width, height, channels, OIIO::TypeDesc::FLOAT);
+  spec.attribute("compression", "zip");
+  spec.attribute("oiio:ColorSpace", "Linear");
+  constexpr float kRec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
+  spec.attribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8), kRec709);
+  spec.attribute("unit", "lx");
+  spec.attribute("DateTime", "");  // else the time of writing goes in, and equal maps have other bytes
+  return encode(path, spec, OIIO::TypeDesc::FLOAT, values.data());
+}
+
+Result<void> write_preview_png(const std::filesystem::path& path, int width, int height, int channels,
+                               std::span<const float> values) {
+  RADBAKE_RETURN_IF_ERROR(check_shape(path, width, height, channels, 3, values.size()));
+  const double exposed = exposed_luminance(values, channels);
+  std::vector<unsigned char> pixels;
+  pixels.reserve(std::size_t(width) * std::size_t(height) * 3);
+  for (std::size_t at = 0; at < values.size(); at += std::size_t(channels)) {
+    // Compress the luminance and keep the colour.
+    const double y = exposed > 0 ? luminance(&values[at]) / exposed : 0;
+    const double scale = exposed > 0 ? (1 + y / (kWhite * kWhite)) / (1 + y) / exposed : 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double shown = linear_to_srgb(std::clamp(values[at + c] * scale, 0.0, 1.0));
+      pixels.push_back(std::isfinite(shown) ? static_cast<unsigned char>(std::lround(255 * shown)) : 0);
+    }
+  }
+  const OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT8);
+  return encode(path, spec, OIIO::TypeDesc::UINT8, pixels.data());
+}
+
+Result<Pixels> read_exr(const std::filesystem::path& path) {
+  try {
+    set_up_oiio();
+    const auto input = OIIO::ImageInput::open(path.string());
+    if (!input) return invalid_argument("cannot read " + path.string() + ": " + OIIO::geterror());
+    const OIIO::ImageSpec& spec = input->spec();
+    Pixels pixels{spec.width, spec.height, spec.nchannels, {}};
+    pixels.values.resize(std::size_t(spec.width) * std::size_t(spec.height) * std::size_t(spec.nchannels));
+    if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, pixels.values.data())) {
+      return invalid_argument("cannot read " + path.string() + ": " + input->geterror());
+    }
+    return pixels;
+  } catch (const std::exception& error) {
+    return invalid_argument("cannot read " + path.string() + ": " + error.what());
+  }
+}
+
+}  // namespace radbake::image

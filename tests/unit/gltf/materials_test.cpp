@@ -1,0 +1,208 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/gltf/gltf_builder.h"
+
+namespace radbake::gltf {
+namespace {
+
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Textures are float.
+constexpr double kFloat = 1e-6;
+
+GltfScene read(const GltfBuilder& file, double max_reflectance = 0.98) {
+  Result<GltfScene> result = read_bytes(file.glb(), {max_reflectance});
+  EXPECT_TRUE(result.ok()) << result.error().message;
+  return result.ok() ? std::move(result).value() : GltfScene{};
+}
+
+// The square with texture coordinates and a texture of the text image on its base colour.
+GltfBuilder textured(const std::string& image) {
+  GltfBuilder file = square();
+  const int uv = file.add_floats({0, 0, 1, 0, 1, 1, 0, 1}, "VEC2");
+  file.document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv;
+  file.add("images", {{"name", "bricks"}, {"bufferView", file.add_view(image)}, {"mimeType", "image/png"}});
+  file.add("samplers", {{"wrapS", 33071}, {"wrapT", 33648}});
+  file.add("textures", {{"source", 0}, {"sampler", 0}});
+  file.document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+  return file;
+}
+
+json& material(GltfBuilder& file) { return file.document["materials"][0]; }
+
+TEST(GltfMaterials, ReadsFactorsAndSides) {
+  GltfBuilder file = square();
+  material(file)["pbrMetallicRoughness"]["baseColorFactor"] = {0.25, 0.5, 0.75, 1};
+  material(file)["doubleSided"] = true;
+  const GltfScene scene = read(file);
+  const Material& grey = scene.scene.materials.at(0);
+  EXPECT_EQ(grey.name, "grey");
+  EXPECT_EQ(grey.reflectance, (Vec3{0.25, 0.5, 0.75}));
+  EXPECT_EQ(grey.emissive, (Vec3{0, 0, 0}));
+  EXPECT_TRUE(grey.is_double_sided);
+  EXPECT_THAT(scene.warnings, IsEmpty());
+}
+
+TEST(GltfMaterials, MultipliesEmissionByItsStrength) {
+  GltfBuilder file = square();
+  material(file)["emissiveFactor"] = {1, 0.5, 0.25};
+  EXPECT_EQ(read(file).scene.materials.at(0).emissive, (Vec3{1, 0.5, 0.25}));
+  material(file)["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = 400;
+  EXPECT_EQ(read(file).scene.materials.at(0).emissive, (Vec3{400, 200, 100}));
+}
+
+TEST(GltfMaterials, LimitsReflectanceAndNamesTheMaterialWithItsShare) {
+  GltfBuilder file = square();
+  // A second square of four times the area in white.
+  file.add("materials", {{"name", "white"}, {"pbrMetallicRoughness", {{"metallicFactor", 0}}}});
+  const int mesh = file.add_mesh({{"attributes", {{"POSITION", 0}}}, {"indices", 1}, {"material", 1}});
+  file.add_root({{"mesh", mesh}, {"scale", {2, 2, 1}}});
+  const GltfScene scene = read(file, 0.9);
+  EXPECT_EQ(scene.scene.materials.at(0).reflectance, (Vec3{0.5, 0.5, 0.5}));
+  EXPECT_EQ(scene.scene.materials.at(1).reflectance, (Vec3{0.9, 0.9, 0.9}));
+  EXPECT_EQ(warning_text(scene, "reflectance_limited"),
+            "reflectance limited to 0.9: material 'white' (80 % of the area)");
+  EXPECT_EQ(scene.warnings.size(), 1u);
+}
+
+TEST(GltfMaterials, NamesAFewOfManyMaterials) {
+  GltfBuilder file = square();
+  for (int i = 1; i < 6; ++i) {
+    file.add("materials", {{"name", "m" + std::to_string(i)}, {"pbrMetallicRoughness", {{"metallicFactor", 0}}}});
+    const int mesh = file.add_mesh({{"attributes", {{"POSITION", 0}}}, {"indices", 1}, {"material", i}});
+    file.add_root({{"mesh", mesh}});
+  }
+  EXPECT_THAT(warning_text(read(file), "reflectance_limited"), HasSubstr("'m1', 'm2', 'm3' and 2 more (83.3 %"));
+}
+
+TEST(GltfMaterials, APrimitiveWithoutMaterialHasTheDefaultOne) {
+  GltfBuilder file = square();
+  file.document["meshes"][0]["primitives"][0].erase("material");
+  const GltfScene scene = read(file);
+  EXPECT_EQ(scene.scene.materials.at(0).reflectance, (Vec3{0.98, 0.98, 0.98}));
+  EXPECT_THAT(warning_text(scene, "reflectance_limited"), HasSubstr("default material"));
+  EXPECT_THAT(warning_text(scene, "metallic_as_diffuse"), HasSubstr("100 %"));
+}
+
+TEST(GltfMaterials, KeepsATextureThatNeedsNoLimit) {
+  GltfBuilder file = textured("2 1 3  0.25 0.5 0.75  0.9 0.8 0.7");
+  material(file)["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 1};
+  const GltfScene scene = read(file);
+  const TexturePlane& plane = scene.scene.textures.at(0);
+  EXPECT_EQ(plane.name, "bricks");
+  EXPECT_EQ(plane.wrap_s, Wrap::kClamp);
+  EXPECT_EQ(plane.wrap_t, Wrap::kMirror);
+  // White times a texture of at most 0.9 stays below 0.98: the products are the file's.
+  const Vec3 factor = scene.scene.materials.at(0).reflectance;
+  EXPECT_LT(max_component(factor), 1);
+  EXPECT_NEAR(plane.values.at(0) * factor.x, 0.25, kFloat);
+  EXPECT_NEAR(plane.values.at(3) * factor.x, 0.9, kFloat);
+  EXPECT_NEAR(plane.values.at(5) * factor.z, 0.7, kFloat);
+  EXPECT_EQ(warning_text(scene, "reflectance_limited"), "");
+}
+
+TEST(GltfMaterials, LimitsTheTexelsThatAreTooBright) {
+  GltfBuilder file = textured("2 2 3  1 1 1  0.5 0.5 0.5  0.5 0.5 0.5  0.25 0.25 0.25");
+  material(file)["pbrMetallicRoughness"]["baseColorFactor"] = {1, 0.5, 1, 1};
+  const GltfScene scene = read(file, 0.8);
+  const Vec3 factor = scene.scene.materials.at(0).reflectance;
+  const TexturePlane& plane = scene.scene.textures.at(0);
+  EXPECT_NEAR(plane.values.at(0) * factor.x, 0.8, kFloat);
+  EXPECT_NEAR(plane.values.at(1) * factor.y, 0.5, kFloat);
+  EXPECT_NEAR(plane.values.at(3) * factor.x, 0.5, kFloat);
+  for (std::size_t i = 0; i < plane.values.size(); ++i) EXPECT_LE(plane.values[i] * factor[int(i % 3)], 0.8);
+  // One texel of four.
+  EXPECT_THAT(warning_text(scene, "reflectance_limited"), HasSubstr("25 %"));
+}
+
+TEST(GltfMaterials, SharesAPlaneAmongMaterialsOfEqualUse) {
+  GltfBuilder file = textured("1 1 3 0.5 0.5 0.5");
+  file.document["materials"].push_back(file.document["materials"][0]);
+  json second = file.document["meshes"][0]["primitives"][0];
+  second["material"] = 1;
+  file.document["meshes"][0]["primitives"].push_back(second);
+  const GltfScene scene = read(file);
+  EXPECT_EQ(scene.scene.materials.size(), 2u);
+  EXPECT_EQ(scene.scene.textures.size(), 1u);
+}
+
+TEST(GltfMaterials, AsksForColoursInSrgbAndForMetalnessAsItIs) {
+  GltfBuilder file = textured("1 1 3 0.5 0.5 0.5");
+  material(file)["pbrMetallicRoughness"]["metallicFactor"] = 1;
+  material(file)["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {{"index", 0}};
+  std::vector<bool> asked;
+  const ImageDecoder spy = [&](auto bytes, const std::string& name, bool is_srgb) {
+    asked.push_back(is_srgb);
+    return decode_text_image(bytes, name, is_srgb);
+  };
+  const TemporaryFolder folder;
+  ASSERT_TRUE(read_gltf(folder.write("scene.glb", file.glb()), spy, {}).ok());
+  EXPECT_THAT(asked, ElementsAre(true, false));
+}
+
+TEST(GltfMaterials, DecodesNoTextureThatNoMeshUses) {
+  GltfBuilder file = square();
+  file.add("images", {{"bufferView", file.add_view("garbage!")}, {"mimeType", "image/png"}});
+  file.add("images", {{"uri", "missing.png"}});
+  file.add("textures", {{"source", 0}});
+  file.add("textures", {{"source", 1}});
+  file.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+  material(file)["normalTexture"] = {{"index", 1}};
+  const GltfScene scene = read(file);
+  EXPECT_EQ(scene.scene.materials.size(), 1u);
+  EXPECT_THAT(scene.scene.textures, IsEmpty());
+  EXPECT_THAT(warning_text(scene, "normal_map_not_simulated"), HasSubstr("'grey' (100 %"));
+}
+
+TEST(GltfMaterials, WarnsOfMetalOnlyWhereThereIsSome) {
+  GltfBuilder file = textured("1 1 3 0.5 0.5 0");
+  material(file)["pbrMetallicRoughness"]["metallicFactor"] = 1;
+  EXPECT_THAT(warning_text(read(file), "metallic_as_diffuse"), HasSubstr("'grey'"));
+  material(file)["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {{"index", 0}};
+  EXPECT_EQ(warning_text(read(file), "metallic_as_diffuse"), "");
+}
+
+TEST(GltfMaterials, WarnsOfAlphaOnlyWhereItIsNotOpaqueInFact) {
+  GltfBuilder file = textured("2 1 4  0.5 0.5 0.5 1  0.5 0.5 0.5 0.6");
+  EXPECT_EQ(warning_text(read(file), "alpha_not_simulated"), "");
+  EXPECT_EQ(read(file).scene.textures.at(0).channels, 3);  // glTF: OPAQUE ignores alpha
+  material(file)["alphaMode"] = "BLEND";
+  const GltfScene blended = read(file);
+  EXPECT_THAT(warning_text(blended, "alpha_not_simulated"), HasSubstr("'grey'"));
+  EXPECT_EQ(blended.scene.materials.at(0).alpha_mode, AlphaMode::kBlend);
+  EXPECT_EQ(blended.scene.textures.at(0).channels, 4);
+  EXPECT_FLOAT_EQ(blended.scene.textures.at(0).values.at(7), 0.6f);
+  material(file)["alphaMode"] = "MASK";
+  EXPECT_EQ(warning_text(read(file), "alpha_not_simulated"), "");  // 0.6 passes the default cutoff of 0.5
+  material(file)["alphaCutoff"] = 0.7;
+  const GltfScene masked = read(file);
+  EXPECT_THAT(warning_text(masked, "alpha_not_simulated"), HasSubstr("'grey'"));
+  EXPECT_EQ(masked.scene.materials.at(0).alpha_cutoff, 0.7);
+}
+
+TEST(GltfMaterials, WarnsOfTransmissionAndUnlit) {
+  GltfBuilder file = square();
+  material(file)["extensions"] = {{"KHR_materials_transmission", {{"transmissionFactor", 0.9}}},
+                                  {"KHR_materials_unlit", json::object()}};
+  const GltfScene scene = read(file);
+  EXPECT_THAT(warning_text(scene, "transmission_not_simulated"), HasSubstr("'grey' (100 %"));
+  EXPECT_THAT(warning_text(scene, "unlit"), HasSubstr("'grey' (100 %"));
+}
+
+TEST(GltfMaterials, WarnsOfExtensionsThatItIgnores) {
+  GltfBuilder file = square();
+  file.document["extensionsUsed"] = {"KHR_materials_ior", "KHR_texture_transform", "ACME_moss"};
+  EXPECT_EQ(warning_text(read(file), "extensions_ignored"),
+            "extensions that are not read: 'KHR_texture_transform', 'ACME_moss'");
+}
+
+TEST(GltfMaterials, RefusesALimitThatDoesNotConverge) {
+  expect_refused(read_bytes(square().glb(), {1.0}), {"largest reflectance is 1.0"});
+}
+
+}  // namespace
+}  // namespace radbake::gltf

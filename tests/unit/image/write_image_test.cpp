@@ -7,6 +7,7 @@
 
 #include <fstream>
 #include <limits>
+#include <regex>
 #include <sstream>
 
 namespace radbake::image {
@@ -82,8 +83,8 @@ TEST_F(WriteImage, EqualImagesHaveEqualBytesAndNoDate) {
   for (const char* name : {"a.png", "b.png"}) ASSERT_TRUE(write_preview_png(file(name), 5, 3, 4, ramp(5, 3)).ok());
   EXPECT_EQ(bytes_of("a.exr"), bytes_of("b.exr"));
   EXPECT_EQ(bytes_of("a.png"), bytes_of("b.png"));
-  const auto input = OIIO::ImageInput::open(file("a.exr").string());
-  EXPECT_EQ(input->spec().get_string_attribute("DateTime"), "");
+  // OpenImageIO writes the time into an EXR unless told otherwise, as 2026:01:31 23:59:59.
+  EXPECT_FALSE(std::regex_search(bytes_of("a.exr"), std::regex("[0-9]{4}:[0-9]{2}:[0-9]{2} ")));
   EXPECT_THAT(bytes_of("a.png"), Not(HasSubstr("tIME")));
 }
 

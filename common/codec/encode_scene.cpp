@@ -2,6 +2,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/check.h"
 #include "common/codec/grid.h"
 #include "common/codec/manifest_codec.h"
 #include "common/codec/mesh_codec.h"
@@ -187,6 +188,7 @@ Result<v1::MeshRecord> encode_and_verify(const Scene& scene, const Mesh& origina
 }  // namespace
 
 Result<EncodedScene> encode_scene(const Scene& scene, const EncodeOptions& options) {
+  RADBAKE_CHECK_LT(0.0, options.texels_per_meter);
   for (const Mesh& mesh : scene.meshes) RADBAKE_RETURN_IF_ERROR(check_mesh(scene, mesh));
   RADBAKE_ASSIGN_OR_RETURN(const PositionGrid positions,
                            choose_position_grid(scene, options.atlas_size, options.texels_per_meter));

@@ -30,15 +30,16 @@ struct EncodedScene {
 
 struct EncodeOptions {
   int atlas_size = 0;            ///< as asked; 0: texel size comes from texels_per_meter
-  double texels_per_meter = 32;  ///< used where there is no atlas size or no texcoord1
+  double texels_per_meter = 32;  ///< positive; used where there is no atlas size or no texcoord1
 };
 
 /// Encodes a scene: meshes by Draco (edgebreaker), textures as float32 planes, the rest as a SceneManifest.
 ///
-/// Positions go on one explicit grid for the whole scene, of the fewest bits (at most 24) that move no position by
-/// more than 1/1000 of the scene's 5th-percentile texel; where 24 bits do not suffice, no mesh's positions are
-/// quantised. Texture coordinates likewise, mesh by mesh: no lightmap coordinate moves by more than 1/100 texel, else
-/// that mesh's coordinates go unquantised. All bounds are checked on the decoded blobs, not assumed.
+/// Positions go on one explicit grid for the whole scene: the coarsest whose step is a power of two that moves no
+/// position by more than 1/1000 of the scene's 5th-percentile texel; where that takes more than 24 bits, no mesh's
+/// positions are quantised. Texture coordinates likewise, mesh by mesh: none moves by more than 1/100 texel of what it
+/// looks up (without an atlas size: of 4096), else it goes unquantised. All bounds are checked on the decoded blobs,
+/// not assumed. Triangles that use a vertex twice are not sent, and neither are meshes of nothing else.
 ///
 /// Errors: kInvalidArgument for an empty scene or a mesh that Draco refuses.
 Result<EncodedScene> encode_scene(const Scene& scene, const EncodeOptions& options);

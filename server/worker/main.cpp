@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   CLI::App app("Bakes one scene. radbaked starts it; it is of no use alone.", "radbake-worker");
   app.add_option("--fd", fd, "Inherited socket that is connected to radbaked")
       ->required()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, 1 << 20));
   app.add_option("--job", identity.job, "Name of the job")->required();
   app.add_option("--attempt", identity.attempt, "Number of this attempt at the job")->required();
   app.add_flag("--log-json", log.is_json, "Log JSON lines instead of text");

@@ -75,7 +75,8 @@ EncodedScene small_scene() {
   Mesh mesh;
   mesh.name = "node/floor#0";
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}};
-  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  mesh.texcoord1 = {{0.1, 0.1}, {0.9, 0.1}, {0.9, 0.9}, {0.1, 0.9}};
+  mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
   scene.meshes = {mesh};
   scene.materials.resize(1);
   scene.lights = {{"lamp", PointLight{{0, 1, 0}, {1, 1, 1}}}};

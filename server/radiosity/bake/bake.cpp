@@ -87,10 +87,10 @@ class Bake {
     outcome_.report.warnings = prepared_.plan.warnings;
     outcome_.report.num_patches = prepared_.patches.size();
 
-    const auto visibility = make_embree_visibility(surfaces_.corners);
-    outcome_.report.instruction_set = visibility->instruction_set();
-    const HemisphereEstimator estimator(surfaces_, prepared_.patches, *visibility, prepared_.plan.rays_per_row);
-    const DirectLight patch_direct(surfaces_, *visibility, kLightSamplesPerPatch);
+    const Visibility& visibility = *prepared_.visibility;
+    outcome_.report.instruction_set = visibility.instruction_set();
+    const HemisphereEstimator estimator(surfaces_, prepared_.patches, visibility, prepared_.plan.rays_per_row);
+    const DirectLight patch_direct(surfaces_, visibility, kLightSamplesPerPatch);
 
     std::vector<PatchRow> rows = sample_patch_rows(
         surfaces_, prepared_.patches, estimator, patch_direct, options_.seed,
@@ -100,7 +100,7 @@ class Bake {
     RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> radiosity, solve(rows, patch_direct.emitted_lumens()));
     rows = {};
 
-    const DirectLight texel_direct(surfaces_, *visibility, kLightSamplesPerTexel);
+    const DirectLight texel_direct(surfaces_, visibility, kLightSamplesPerTexel);
     if (!gather(estimator, texel_direct, radiosity)) return cancelled();
     outcome_.report.stages = progress_.stage_times();
     return std::move(outcome_);

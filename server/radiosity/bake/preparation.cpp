@@ -24,7 +24,10 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   }
   const auto max_patches = static_cast<std::size_t>(options.max_patches > 0 ? options.max_patches : kDefaultMaxPatches);
   const double texel_edge = 1 / (prepared->atlas.texels_per_meter() * surfaces.metres_per_unit);
-  prepared->patches = make_patches(surfaces, {patch_edge(texel_edge, area, max_patches), max_patches});
+  prepared->visibility = make_embree_visibility(surfaces.corners);
+  if (stop.stop_requested()) return cancelled;
+  prepared->patches =
+      make_patches(surfaces, *prepared->visibility, {patch_edge(texel_edge, area, max_patches), max_patches});
   if (stop.stop_requested()) return cancelled;
 
   BakePlan& plan = prepared->plan;
@@ -40,6 +43,12 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.solver = "gauss-seidel";
   plan.texels_per_meter = prepared->atlas.texels_per_meter();
   plan.warnings = prepared->surveyed.warnings;
+  if (prepared->patches.num_uncut() > 0) {
+    plan.warnings.push_back({"contacts_not_cut", std::to_string(prepared->patches.num_uncut()) +
+                                                     " patches reach across surfaces that stand on them: more would "
+                                                     "pass the limit of " +
+                                                     std::to_string(max_patches) + " patches (--max-patches)"});
+  }
   return prepared;
 }
 

@@ -8,12 +8,14 @@
 #include "server/radiosity/patches/patches.h"
 #include "server/radiosity/plan/plan.h"
 #include "server/radiosity/survey/survey.h"
+#include "server/radiosity/visibility/visibility.h"
 
 namespace radbake::radiosity {
 
 /// A scene that is ready to be baked: checked, laid out and cut into patches. Parts refer to each other: kept in place.
 struct Preparation {
   SurveyedScene surveyed;
+  std::unique_ptr<Visibility> visibility;
   Atlas atlas;
   Patches patches;
   BakePlan plan;

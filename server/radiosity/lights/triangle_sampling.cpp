@@ -7,8 +7,9 @@
 namespace radbake::radiosity {
 namespace {
 
-/// Triangles that subtend less are sampled by area: cos and r hardly vary, and the spherical excess loses digits.
-constexpr double kNarrowSolidAngle = 3e-3;
+/// Triangles of less area than this over the squared distance are sampled by area: cos and r vary little over them, and
+/// the spherical excess of very small ones loses digits.
+constexpr double kNarrow = 0.1;
 
 double clamped_acos(double x) { return std::acos(std::clamp(x, -1.0, 1.0)); }
 
@@ -35,6 +36,8 @@ Vec3 tangent(Vec3 a, Vec3 b) {
 
 TriangleSample sampled_triangle(const std::array<Vec3, 3>& corners, Vec3 normal, double area, Vec3 viewer, double x,
                                 double y) {
+  const Vec3 to_middle = (corners[0] + corners[1] + corners[2]) / 3 - viewer;
+  if (area < kNarrow * dot(to_middle, to_middle)) return by_area(corners, normal, area, viewer, x, y);
   std::array<Vec3, 3> d;
   for (int k = 0; k < 3; ++k) {
     d[k] = corners[k] - viewer;
@@ -45,7 +48,8 @@ TriangleSample sampled_triangle(const std::array<Vec3, 3>& corners, Vec3 normal,
   // Solid angle: tan(Omega/2) = |a.(b x c)| / (1 + a.b + b.c + c.a). Source: Van Oosterom & Strackee 1983.
   const double triple = std::fabs(dot(d[0], cross(d[1], d[2])));
   const double omega = 2 * std::atan2(triple, 1 + dot(d[0], d[1]) + dot(d[1], d[2]) + dot(d[2], d[0]));
-  if (omega < kNarrowSolidAngle) return by_area(corners, normal, area, viewer, x, y);
+  constexpr double kMinSolidAngle = 1e-6;  // seen from the side
+  if (omega < kMinSolidAngle) return by_area(corners, normal, area, viewer, x, y);
 
   // Cut a sub-triangle of area x * Omega off at the corner a: its third corner c' lies on the arc from a to c.
   const Vec3 a = d[0], b = d[1], c = d[2];

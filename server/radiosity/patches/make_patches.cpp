@@ -4,6 +4,8 @@
 #include <tuple>
 
 #include "common/base/check.h"
+#include "server/radiosity/patches/contact_cuts.h"
+#include "server/radiosity/patches/grid_polygon.h"
 #include "server/radiosity/patches/groups.h"
 #include "server/radiosity/patches/patches.h"
 
@@ -29,45 +31,16 @@ struct Plane {
   std::uint32_t first_triangle = kNoPatch;
 };
 
-struct Corner {
-  Vec2 uv;
-  Vec3 grid;  ///< grid coordinates
-};
-using Polygon = std::vector<Corner>;
-
-double signed_area(Vec2 a, Vec2 b, Vec2 c) { return cross(b - a, c - a) / 2; }
-
-double area_in_uv(const Polygon& polygon) {
-  double area = 0;
-  for (std::size_t k = 2; k < polygon.size(); ++k) area += signed_area(polygon[0].uv, polygon[k - 1].uv, polygon[k].uv);
-  return area;
-}
-
-/// The part of a convex polygon where sign * (grid[axis] - bound) >= 0. Source: Sutherland & Hodgman 1974.
-Polygon clipped(const Polygon& polygon, int axis, double bound, double sign) {
-  Polygon inside;
-  for (std::size_t k = 0; k < polygon.size(); ++k) {
-    const Corner& a = polygon[k];
-    const Corner& b = polygon[(k + 1) % polygon.size()];
-    const double da = sign * (a.grid[axis] - bound), db = sign * (b.grid[axis] - bound);
-    if (da >= 0) inside.push_back(a);
-    if ((da > 0 && db < 0) || (da < 0 && db > 0)) {
-      const double t = da / (da - db);
-      Corner cut{a.uv + (b.uv - a.uv) * t, a.grid + (b.grid - a.grid) * t};
-      cut.grid[axis] = bound;
-      inside.push_back(cut);
-    }
-  }
-  if (inside.size() < 3) inside.clear();
-  return inside;
-}
-
 }  // namespace
 
 class PatchBuilder {
  public:
-  PatchBuilder(const Surfaces& surfaces, const PatchOptions& options)
-      : surfaces_(surfaces), options_(options), groups_(group_surfaces(surfaces)) {
+  PatchBuilder(const Surfaces& surfaces, const Visibility& visibility, const PatchOptions& options)
+      : surfaces_(surfaces),
+        visibility_(visibility),
+        options_(options),
+        groups_(group_surfaces(surfaces)),
+        max_uncut_(options.max_patches - options.max_patches / 4) {
     find_planes();
   }
 
@@ -76,13 +49,13 @@ class PatchBuilder {
     Merging merging = Merging::kNone;
     // Coarsen until the bound holds; where even the groups are too many, merge the smallest.
     while (!try_edge(edge, merging)) {
-      if (merging == Merging::kNone && num_group_sides_ > options_.max_patches / 2) {
+      if (merging == Merging::kNone && num_group_sides_ > max_uncut_ / 2) {
         merging = Merging::kWithinMaterial;
       } else if (edge >= kWholeSceneEdge) {
         RADBAKE_CHECK(merging != Merging::kAcrossMaterials);
         merging = merging == Merging::kNone ? Merging::kWithinMaterial : Merging::kAcrossMaterials;
       } else {
-        const double excess = static_cast<double>(count_) / static_cast<double>(options_.max_patches);
+        const double excess = static_cast<double>(count_) / static_cast<double>(max_uncut_);
         edge = std::min(kWholeSceneEdge, edge * std::clamp(std::sqrt(excess), 1.05, 2.0));
       }
     }
@@ -175,9 +148,9 @@ class PatchBuilder {
     cell_is_double_sided_.clear();
     for (std::uint32_t t = 0; t < surfaces_.size(); ++t) {
       cut_triangle(t);
-      if (count_ > 4 * options_.max_patches) return false;
+      if (count_ > 4 * max_uncut_) return false;
     }
-    if (count_ > options_.max_patches) return false;
+    if (count_ > max_uncut_) return false;
     finish();
     return true;
   }
@@ -254,7 +227,7 @@ class PatchBuilder {
     }
     result_.maps_[t] = {at[0], at[1] - at[0], at[2] - at[0]};
 
-    const Polygon whole = {{{0, 0}, at[0]}, {{1, 0}, at[1]}, {{0, 1}, at[2]}};
+    const GridPolygon whole = {{{0, 0}, at[0]}, {{1, 0}, at[1]}, {{0, 1}, at[2]}};
     const double cell_area = cell_size_[g].x * cell_size_[g].y;
     const bool is_merged = grid.cells == std::array<std::int32_t, 3>{1, 1, 1};
     const double negligible = is_merged ? 0 : kNegligiblePart * std::min(cell_area, surfaces_.areas[t]);
@@ -263,28 +236,28 @@ class PatchBuilder {
   }
 
   /// Cuts a polygon along one axis, then its parts along the next; parts of all three become pieces.
-  void cut_axis(std::uint32_t t, std::uint32_t g, const Polygon& polygon, int axis, std::array<std::int32_t, 3>& index,
-                double negligible) {
+  void cut_axis(std::uint32_t t, std::uint32_t g, const GridPolygon& polygon, int axis,
+                std::array<std::int32_t, 3>& index, double negligible) {
     if (axis == 3) return add_piece(t, g, polygon, index, negligible);
     const std::int32_t cells = result_.grids_[g].cells[axis];
     double low = polygon[0].grid[axis], high = low;
-    for (const Corner& corner : polygon) {
+    for (const GridCorner& corner : polygon) {
       low = std::min(low, corner.grid[axis]);
       high = std::max(high, corner.grid[axis]);
     }
     const std::int32_t first = std::clamp(static_cast<std::int32_t>(std::floor(low)), 0, cells - 1);
     const std::int32_t last = std::clamp(static_cast<std::int32_t>(std::floor(high)), 0, cells - 1);
     for (std::int32_t i = first; i <= last; ++i) {
-      Polygon part = polygon;
-      if (i > first) part = clipped(part, axis, i, 1);
-      if (i < last && !part.empty()) part = clipped(part, axis, i + 1, -1);
+      GridPolygon part = polygon;
+      if (i > first) part = clipped_to_axis(part, axis, i, 1);
+      if (i < last && !part.empty()) part = clipped_to_axis(part, axis, i + 1, -1);
       if (part.empty()) continue;
       index[axis] = i;
       cut_axis(t, g, part, axis + 1, index, negligible);
     }
   }
 
-  void add_piece(std::uint32_t t, std::uint32_t g, const Polygon& polygon, const std::array<std::int32_t, 3>& index,
+  void add_piece(std::uint32_t t, std::uint32_t g, const GridPolygon& polygon, const std::array<std::int32_t, 3>& index,
                  double negligible) {
     const double area = 2 * surfaces_.areas[t] * area_in_uv(polygon);
     if (!(area > negligible)) return;
@@ -310,8 +283,11 @@ class PatchBuilder {
     }
   }
 
-  /// Sorts pieces by cell (in order of triangles within one), sums areas, and numbers the back patches.
+  /// Cuts cells along contacts, sorts pieces by patch (in order of triangles within one), sums areas, and numbers the
+  /// back patches.
   void finish() {
+    ContactCutter cutter(surfaces_, visibility_, groups_.group_of, result_);
+    cutter.cut_cells(cell_of_piece_, cell_is_double_sided_, options_.max_patches - count_);
     const std::size_t num_cells = cell_is_double_sided_.size();
     std::vector<std::uint64_t>& first = result_.first_piece_;
     first.assign(num_cells + 1, 0);
@@ -341,8 +317,10 @@ class PatchBuilder {
   }
 
   const Surfaces& surfaces_;
+  const Visibility& visibility_;
   PatchOptions options_;
   SurfaceGroups groups_;
+  std::size_t max_uncut_;
   std::vector<Plane> planes_;  ///< [groups]
   std::size_t num_group_sides_ = 0;
   // Of the current attempt:
@@ -353,10 +331,10 @@ class PatchBuilder {
   std::size_t count_ = 0;
 };
 
-Patches make_patches(const Surfaces& surfaces, const PatchOptions& options) {
+Patches make_patches(const Surfaces& surfaces, const Visibility& visibility, const PatchOptions& options) {
   RADBAKE_CHECK_LE(std::size_t{64}, options.max_patches);
   RADBAKE_CHECK_LT(0.0, options.edge);
-  return PatchBuilder(surfaces, options).build();
+  return PatchBuilder(surfaces, visibility, options).build();
 }
 
 }  // namespace radbake::radiosity

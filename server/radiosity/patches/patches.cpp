@@ -1,6 +1,7 @@
 #include "server/radiosity/patches/patches.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace radbake::radiosity {
@@ -23,7 +24,23 @@ std::uint32_t Patches::find(std::uint32_t triangle, double u, double v, bool is_
   }
   std::uint32_t cell = cell_at(group, at);
   if (cell == kNoPatch) cell = some_cell_[triangle];
-  return is_back ? back_of_cell_[cell] : cell;
+  const std::uint32_t front = part_at(cell, position);
+  return is_back ? back_of_cell_[front] : front;
+}
+
+std::uint32_t Patches::part_at(std::uint32_t cell, Vec3 grid) const {
+  const std::uint32_t begin = first_part_[cell], end = first_part_[cell + 1];
+  if (end - begin == 1) return begin;
+  std::uint32_t sides = 0;
+  for (std::uint32_t k = first_cut_[cell]; k < first_cut_[cell + 1]; ++k) {
+    if (cuts_[k].is_beyond(grid)) sides |= 1u << (k - first_cut_[cell]);
+  }
+  // A part too small to be a patch belongs to the one that differs by the fewest cuts.
+  std::uint32_t best = begin;
+  for (std::uint32_t part = begin; part < end; ++part) {
+    if (std::popcount(part_sides_[part] ^ sides) < std::popcount(part_sides_[best] ^ sides)) best = part;
+  }
+  return best;
 }
 
 SurfacePoint Patches::sample(std::uint32_t patch, double x, double y) const {

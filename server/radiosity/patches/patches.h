@@ -7,6 +7,7 @@
 
 #include "common/base/sequence.h"
 #include "server/radiosity/survey/surfaces.h"
+#include "server/radiosity/visibility/visibility.h"
 
 namespace radbake::radiosity {
 
@@ -22,12 +23,16 @@ struct PatchOptions {
 /// Neighbouring triangles of one material within 20 degrees form a group. A group is cut by a regular grid in its plane
 /// (by layers of height too, where it is curved): each occupied cell is a patch, so large triangles are split and
 /// small ones merged by one rule. Groups smaller than a cell that the bound does not allow apart are merged by
-/// position and direction. A double-sided cell has a patch on each side, with the same area.
-/// Indices: front patches first, one a cell, in the order of the triangles; back patches after them.
+/// position and direction. A cell that another surface touches or crosses is cut along that contact, so that no patch
+/// lies on both sides of a wall. A double-sided cell has a patch on each side, with the same area.
+/// Indices: front patches first, one a (part of a) cell, in the order of the triangles; back patches after them.
 class Patches {
  public:
   std::size_t size() const { return areas_.size(); }
+  /// Patches on front sides.
   std::size_t num_cells() const { return first_piece_.size() - 1; }
+  /// Cells that a contact crosses but that the bound on patches did not allow to cut.
+  std::size_t num_uncut() const { return num_uncut_; }
 
   /// Scene units squared.
   double area(std::uint32_t patch) const { return areas_[patch]; }
@@ -47,6 +52,7 @@ class Patches {
 
  private:
   friend class PatchBuilder;
+  friend class ContactCutter;
 
   /// A convex part of a triangle inside a cell, as one triangle of a fan.
   struct Piece {
@@ -72,11 +78,26 @@ class Patches {
     std::size_t operator()(const SparseCell& c) const { return mixed_bits(mixed_bits(c.group) ^ c.flat); }
   };
 
+  /// A straight contact with another surface, in grid coordinates: normal . (x, y) = offset.
+  struct Cut {
+    Vec2 normal;
+    double offset;
+    bool is_beyond(Vec3 grid) const { return normal.x * grid.x + normal.y * grid.y > offset; }
+  };
+
+  std::uint32_t part_at(std::uint32_t cell, Vec3 grid) const;
   std::uint32_t cell_at(std::uint32_t group, const std::array<std::int32_t, 3>& at) const;
   static std::uint64_t flat_index(const Grid& grid, const std::array<std::int32_t, 3>& at) {
     return (static_cast<std::uint64_t>(at[2]) * grid.cells[1] + at[1]) * static_cast<std::uint64_t>(grid.cells[0]) +
            at[0];
   }
+
+  // A grid cell without cuts is one front patch; with cuts it is one for each combination of sides that occurs.
+  std::vector<std::uint32_t> first_part_;  ///< [grid cells + 1], into part_sides_ = front patches
+  std::vector<std::uint32_t> part_sides_;  ///< [front patches] bit k: beyond cut k; ascending within a grid cell
+  std::vector<std::uint32_t> first_cut_;   ///< [grid cells + 1]
+  std::vector<Cut> cuts_;
+  std::size_t num_uncut_ = 0;
 
   std::vector<double> areas_;
   std::vector<std::uint64_t> first_piece_;  ///< [num_cells + 1]
@@ -93,7 +114,8 @@ class Patches {
 
 /// Cuts surfaces into patches of about the wanted edge, coarser where the bound asks for it.
 ///
+/// A quarter of the bound is kept for cuts along contacts.
 /// Errors: none; the bound holds for max_patches >= 64 (checked).
-Patches make_patches(const Surfaces& surfaces, const PatchOptions& options);
+Patches make_patches(const Surfaces& surfaces, const Visibility& visibility, const PatchOptions& options);
 
 }  // namespace radbake::radiosity

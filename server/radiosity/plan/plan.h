@@ -39,14 +39,14 @@ struct BakePlan {
 inline constexpr int kMinAtlasSize = 64;
 inline constexpr int kMaxAtlasSize = 4096;
 inline constexpr double kDefaultTexelsPerMeter = 32;
-inline constexpr int kDefaultRays = 512;
+inline constexpr int kDefaultRays = 256;
 inline constexpr int kMinRays = 8;
 inline constexpr int kMaxRays = 65536;
 inline constexpr int kDefaultMaxPatches = 16384;
 inline constexpr int kMinMaxPatches = 64;
 
 /// Shadow rays to emitters, a texel and a patch. A patch's estimate is averaged over many patches by every texel.
-inline constexpr int kLightSamplesPerTexel = 256;
+inline constexpr int kLightSamplesPerTexel = 128;
 inline constexpr int kLightSamplesPerPatch = 64;
 
 /// Errors: kInvalidArgument naming the option and the value. Zero is always right: it means choose.

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <vector>
 
 #include "common/base/check.h"
@@ -20,6 +21,20 @@ class BruteForceVisibility final : public Visibility {
   void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const override {
     RADBAKE_CHECK_EQ(segments.size(), blocked.size());
     for (std::size_t i = 0; i < segments.size(); ++i) blocked[i] = nearest(segments[i]).triangle != kNoHit;
+  }
+
+  void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const override {
+    triangles.clear();
+    for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+      // By bounding boxes: a superset is asked for.
+      double squared = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [low, high] = std::minmax({triangles_[i][0][axis], triangles_[i][1][axis], triangles_[i][2][axis]});
+        const double outside = std::max({low - point[axis], point[axis] - high, 0.0});
+        squared += outside * outside;
+      }
+      if (squared <= distance * distance) triangles.push_back(i);
+    }
   }
 
   std::string instruction_set() const override { return "double"; }

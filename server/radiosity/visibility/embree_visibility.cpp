@@ -103,6 +103,25 @@ class EmbreeVisibility final : public Visibility {
     }
   }
 
+  void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const override {
+    triangles.clear();
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    RTCPointQuery query{};
+    query.x = static_cast<float>(point.x);
+    query.y = static_cast<float>(point.y);
+    query.z = static_cast<float>(point.z);
+    // Wider by what single precision may move point, triangle and distance.
+    constexpr double kRounding = 0x1p-20;
+    query.radius = static_cast<float>(distance + kRounding * (1 + distance + length(point)));
+    const auto collect = [](RTCPointQueryFunctionArguments* found) {
+      static_cast<std::vector<std::uint32_t>*>(found->userPtr)->push_back(found->primID);
+      return false;  // the radius stays as it is
+    };
+    rtcPointQuery(scene_, &query, &context, collect, &triangles);
+    std::sort(triangles.begin(), triangles.end());
+  }
+
   std::string instruction_set() const override {
     if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return "avx512";
     if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) return "avx";

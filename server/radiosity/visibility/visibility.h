@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "common/geometry/vector.h"
 
@@ -37,6 +38,9 @@ class Visibility {
 
   /// Whether anything lies on each segment. Shapes: segments [n], blocked [n], 0 or 1.
   virtual void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const = 0;
+
+  /// Triangles that come within a distance of a point, ascending; a superset, never fewer.
+  virtual void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const = 0;
 
   /// The instruction set that rays are traced with: equal bytes are promised for one.
   virtual std::string instruction_set() const = 0;

@@ -1,0 +1,219 @@
+#include "server/radiosity/patches/contact_cuts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "server/radiosity/patches/grid_polygon.h"
+
+namespace radbake::radiosity {
+namespace {
+
+/// Lines that cut one cell; further contacts of the same cell are left alone.
+constexpr std::size_t kMaxCuts = 6;
+/// A contact shorter than this share of a cell, or a part smaller than this share of it, comes from rounding.
+constexpr double kNegligible = 1e-5;
+
+/// Where a triangle meets a plane: 0, 1 or 2 points. Corners within `tolerance` of the plane lie in it.
+std::vector<Vec3> points_in_plane(const std::array<Vec3, 3>& corners, Vec3 on_plane, Vec3 normal, double tolerance) {
+  std::array<double, 3> height;
+  int num_in_plane = 0;
+  for (int k = 0; k < 3; ++k) {
+    height[k] = dot(corners[k] - on_plane, normal);
+    if (std::fabs(height[k]) <= tolerance) {
+      height[k] = 0;
+      ++num_in_plane;
+    }
+  }
+  std::vector<Vec3> points;
+  if (num_in_plane == 3) return points;
+  for (int k = 0; k < 3; ++k) {
+    const int next = (k + 1) % 3;
+    if (height[k] == 0) points.push_back(corners[k]);
+    if (height[k] * height[next] < 0) {
+      points.push_back(corners[k] + (corners[next] - corners[k]) * (height[k] / (height[k] - height[next])));
+    }
+  }
+  return points;
+}
+
+/// Whether the segment from a to b runs through the unit cell at (column, row) by more than a rounding.
+bool runs_through_cell(Vec2 a, Vec2 b, double column, double row) {
+  const Vec2 d = b - a;
+  double enter = 0, leave = 1;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double from = axis == 0 ? a.x - column : a.y - row, along = axis == 0 ? d.x : d.y;
+    if (std::fabs(along) < kNegligible) {
+      if (from < 0 || from > 1) return false;
+      continue;
+    }
+    const double t0 = -from / along, t1 = (1 - from) / along;
+    enter = std::max(enter, std::min(t0, t1));
+    leave = std::min(leave, std::max(t0, t1));
+  }
+  return (leave - enter) * std::sqrt(dot(d, d)) > kNegligible;
+}
+
+}  // namespace
+
+void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<char>& is_double_sided,
+                              std::size_t max_new) {
+  // Sort the pieces by cell, in order within one.
+  const std::size_t num_cells = is_double_sided.size();
+  std::vector<std::size_t> first(num_cells + 1, 0);
+  for (const std::uint32_t cell : cell_of_piece) ++first[cell + 1];
+  for (std::size_t c = 0; c < num_cells; ++c) first[c + 1] += first[c];
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  std::vector<Piece> sorted(patches_.pieces_.size());
+  for (std::size_t i = 0; i < sorted.size(); ++i) sorted[next[cell_of_piece[i]]++] = patches_.pieces_[i];
+
+  // Cut each cell, and number its parts in the order of their sides.
+  std::vector<char> is_part_double_sided;
+  std::vector<Cut> cuts;
+  std::vector<std::pair<std::uint32_t, Piece>> parts;
+  patches_.pieces_.clear();
+  cell_of_piece.clear();
+  patches_.first_part_.assign(1, 0);
+  patches_.first_cut_.assign(1, 0);
+  for (std::size_t c = 0; c < num_cells; ++c) {
+    const std::span<const Piece> pieces(&sorted[first[c]], first[c + 1] - first[c]);
+    find_cuts(pieces, cuts);
+    parts.clear();
+    for (const Piece& piece : pieces) split(piece, cuts, parts);
+    std::vector<std::uint32_t> sides;
+    for (const auto& part : parts) sides.push_back(part.first);
+    std::sort(sides.begin(), sides.end());
+    sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
+    const std::size_t added = (sides.size() - 1) * (is_double_sided[c] ? 2 : 1);
+    if (added > max_new) {
+      ++patches_.num_uncut_;
+      cuts.clear();
+      sides.assign(1, 0);
+      parts.clear();
+      for (const Piece& piece : pieces) parts.emplace_back(0, piece);
+    } else {
+      max_new -= added;
+    }
+    for (const auto& [side, piece] : parts) {
+      const auto part = std::lower_bound(sides.begin(), sides.end(), side) - sides.begin();
+      patches_.pieces_.push_back(piece);
+      cell_of_piece.push_back(static_cast<std::uint32_t>(patches_.part_sides_.size() + part));
+    }
+    patches_.part_sides_.insert(patches_.part_sides_.end(), sides.begin(), sides.end());
+    is_part_double_sided.insert(is_part_double_sided.end(), sides.size(), is_double_sided[c]);
+    patches_.cuts_.insert(patches_.cuts_.end(), cuts.begin(), cuts.end());
+    patches_.first_part_.push_back(static_cast<std::uint32_t>(patches_.part_sides_.size()));
+    patches_.first_cut_.push_back(static_cast<std::uint32_t>(patches_.cuts_.size()));
+  }
+  is_double_sided = std::move(is_part_double_sided);
+}
+
+void ContactCutter::find_cuts(std::span<const Piece> pieces, std::vector<Cut>& cuts) {
+  cuts.clear();
+  // Cells of merged groups have no grid to cut in.
+  const auto& grid = patches_.grids_[patches_.group_of_[pieces.front().triangle]];
+  const auto& map = patches_.maps_[pieces.front().triangle];
+  const bool has_grid = dot(map.per_u, map.per_u) > 0 || dot(map.per_v, map.per_v) > 0;
+  if (grid.cells == std::array<std::int32_t, 3>{1, 1, 1} && !has_grid) return;
+
+  // A ball around the cell.
+  Vec3 low, high;
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 p = surfaces_.position({pieces[i].triangle, pieces[i].corners[k].x, pieces[i].corners[k].y});
+      if (i == 0 && k == 0) low = high = p;
+      for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], p[axis]);
+        high[axis] = std::max(high[axis], p[axis]);
+      }
+    }
+  }
+  visibility_.triangles_near((low + high) * 0.5, length(high - low) / 2, near_);
+  const std::uint32_t group = group_of_[pieces.front().triangle];
+  std::uint32_t last = kNoPatch;
+  for (const Piece& piece : pieces) {
+    if (piece.triangle == last) continue;
+    last = piece.triangle;
+    for (const std::uint32_t other : near_) {
+      if (group_of_[other] != group) add_contact(piece, other, cuts);
+    }
+  }
+}
+
+void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, std::vector<Cut>& cuts) const {
+  const std::uint32_t t = piece.triangle;
+  const auto& c = surfaces_.corners[t];
+  const double tolerance = std::max(surfaces_.ray_offsets[t], surfaces_.ray_offsets[other]);
+  const auto points = points_in_plane(surfaces_.corners[other], c[0], surfaces_.normals[t], tolerance);
+  if (points.size() != 2 || cuts.size() == kMaxCuts) return;
+
+  // Into grid coordinates by barycentric weights: u = ((p - c0) x e2).n / |e1 x e2|.
+  const Vec3 e1 = c[1] - c[0], e2 = c[2] - c[0], n = surfaces_.normals[t];
+  const double twice_area = 2 * surfaces_.areas[t];
+  const auto& map = patches_.maps_[t];
+  std::array<Vec2, 2> ends;
+  for (int k = 0; k < 2; ++k) {
+    const Vec3 d = points[k] - c[0];
+    const Vec3 grid =
+        map.origin + map.per_u * (dot(cross(d, e2), n) / twice_area) + map.per_v * (dot(cross(e1, d), n) / twice_area);
+    ends[k] = {grid.x, grid.y};
+  }
+  const Vec2 middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) * (1.0 / 3);
+  const Vec3 inside = map.origin + map.per_u * middle.x + map.per_v * middle.y;
+  if (!runs_through_cell(ends[0], ends[1], std::floor(inside.x), std::floor(inside.y))) return;
+
+  const Vec2 along = ends[1] - ends[0];
+  const double size = std::sqrt(dot(along, along));
+  Cut cut{{-along.y / size, along.x / size}, 0};
+  cut.offset = dot(cut.normal, ends[0]);
+  // The two triangles of a wall meet the floor in one line; it need not be cut twice.
+  for (const Cut& known : cuts) {
+    const double cosine = dot(known.normal, cut.normal);
+    if (std::fabs(cosine) > 1 - kNegligible &&
+        std::fabs(known.offset * (cosine < 0 ? -1 : 1) - cut.offset) < kNegligible) {
+      return;
+    }
+  }
+  cuts.push_back(cut);
+}
+
+void ContactCutter::split(const Piece& piece, std::span<const Cut> cuts,
+                          std::vector<std::pair<std::uint32_t, Piece>>& parts) const {
+  const auto& map = patches_.maps_[piece.triangle];
+  GridPolygon whole;
+  for (const Vec2 uv : piece.corners) whole.push_back({uv, map.origin + map.per_u * uv.x + map.per_v * uv.y});
+  std::vector<std::pair<std::uint32_t, GridPolygon>> polygons = {{0, whole}};
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
+    const Cut& cut = cuts[k];
+    const auto height = [&cut](Vec3 grid) { return cut.normal.x * grid.x + cut.normal.y * grid.y - cut.offset; };
+    std::vector<std::pair<std::uint32_t, GridPolygon>> halves;
+    for (const auto& [sides, polygon] : polygons) {
+      GridPolygon beyond = clipped(polygon, height);
+      GridPolygon before = clipped(polygon, [&](Vec3 grid) { return -height(grid); });
+      // A line along the border of the polygon cuts nothing off.
+      const double whole_area = area_in_uv(polygon);
+      const double cut_off = kNegligible * whole_area;
+      if (area_in_uv(beyond) <= cut_off) {
+        halves.emplace_back(sides, polygon);
+      } else if (area_in_uv(before) <= cut_off) {
+        halves.emplace_back(sides | 1u << k, polygon);
+      } else {
+        halves.emplace_back(sides | 1u << k, std::move(beyond));
+        halves.emplace_back(sides, std::move(before));
+      }
+    }
+    polygons = std::move(halves);
+  }
+  for (const auto& [sides, polygon] : polygons) {
+    for (std::size_t k = 2; k < polygon.size(); ++k) {
+      Piece part = piece;
+      part.corners = {polygon[0].uv, polygon[k - 1].uv, polygon[k].uv};
+      part.area_up_to =
+          2 * surfaces_.areas[piece.triangle] * signed_area(part.corners[0], part.corners[1], part.corners[2]);
+      if (part.area_up_to > 0) parts.emplace_back(sides, part);
+    }
+  }
+}
+
+}  // namespace radbake::radiosity

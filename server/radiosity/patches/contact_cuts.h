@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/radiosity/patches/patches.h"
+
+namespace radbake::radiosity {
+
+/// Cuts grid cells along the lines where another surface touches or crosses them.
+///
+/// A wall that stands on a floor, or goes through it, meets it in a segment; each cell that the segment runs through is
+/// cut by its whole line. Surfaces that lie in the cell's own plane cut nothing.
+class ContactCutter {
+ public:
+  /// Works on patches whose pieces are not sorted yet.
+  ContactCutter(const Surfaces& surfaces, const Visibility& visibility, std::span<const std::uint32_t> group_of,
+                Patches& patches)
+      : surfaces_(surfaces), visibility_(visibility), group_of_(group_of), patches_(patches) {}
+
+  /// Turns cells into parts: cell_of_piece and is_double_sided are by grid cell before, by front patch after.
+  /// At most max_new patches are added; cells beyond that stay whole and are counted.
+  void cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<char>& is_double_sided, std::size_t max_new);
+
+ private:
+  using Cut = Patches::Cut;
+  using Piece = Patches::Piece;
+
+  void find_cuts(std::span<const Piece> pieces, std::vector<Cut>& cuts);
+  void add_contact(const Piece& piece, std::uint32_t other, std::vector<Cut>& cuts) const;
+  void split(const Piece& piece, std::span<const Cut> cuts, std::vector<std::pair<std::uint32_t, Piece>>& parts) const;
+
+  const Surfaces& surfaces_;
+  const Visibility& visibility_;
+  std::span<const std::uint32_t> group_of_;
+  Patches& patches_;
+  std::vector<std::uint32_t> near_;
+};
+
+}  // namespace radbake::radiosity

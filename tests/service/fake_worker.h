@@ -1,0 +1,33 @@
+#pragma once
+
+namespace radbake::testing {
+
+/// What the fake worker does: a test puts the number into BakeSettings.seed.
+enum FakeWork {
+  kSucceed = 1,             ///< all states, BakeSettings.max_patches tiles, one layer
+  kFailBadScene = 2,        ///< reports INVALID_ARGUMENT
+  kCrash = 3,               ///< ends by SIGSEGV in the middle
+  kExitWithMessage = 4,     ///< writes a line to stderr and exits with code 7
+  kHang = 5,                ///< says nothing any more
+  kRunUntilCancelled = 6,   ///< reports progress until it is told to stop
+  kIgnoreCancel = 7,        ///< reports progress for ever
+  kSendWrongDigest = 8,     ///< its layer does not have the digest that it claims
+  kNameUnsentBlob = 9,      ///< its result names a blob that it never sent
+  kListDescriptors = 10,    ///< fails with the list of its open descriptors
+  kSucceedSecondTime = 11,  ///< attempt 1 as kRunUntilCancelled, attempt 2 as kSucceed
+  kReadInputs = 12,         ///< fails with the sum of the sizes of its inputs, read from their descriptors
+};
+
+// What a worker does before it has its work goes by its program's name.
+inline constexpr char kWrongAttemptName[] = "worker-of-a-wrong-attempt";
+inline constexpr char kWrongVersionName[] = "worker-of-a-wrong-version";
+inline constexpr char kMuteName[] = "worker-that-never-connects";
+
+/// Side of the tiles, and width of the layer, which is as high as its tiles.
+inline constexpr int kTileSize = 8;
+inline constexpr int kFakeChannels = 4;
+/// Patches in every fake plan.
+inline constexpr int kFakePatches = 42;
+inline constexpr char kLastWords[] = "the fake worker says good-bye";
+
+}  // namespace radbake::testing

@@ -1,0 +1,131 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/service/test_server.h"
+
+namespace radbake::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+class WorkersServiceTest : public ::testing::Test {
+ protected:
+  static service::BakeServerOptions options_in(const std::filesystem::path& folder, const std::string& program = "") {
+    service::BakeServerOptions options = TestServer::options_in(folder, program);
+    options.queue.worker.silence_limit = 1s;
+    options.queue.worker.cancel_grace = 200ms;
+    options.queue.check_interval = 20ms;
+    return options;
+  }
+
+  /// How a bake ends that is done by workers of one kind.
+  v1::Bake bake_with(const std::string& program) {
+    TemporaryFolder folder;
+    TestServer server(options_in(folder.path(), program));
+    TestClient client = server.client();
+    return client.watch(client.submit(kSucceed).name()).finished();
+  }
+
+  v1::Bake bake(FakeWork work) { return client_.watch(client_.submit(work).name()).finished(); }
+
+  void expect_failed(const v1::Bake& bake, int code, const std::string& message) {
+    EXPECT_EQ(bake.state(), v1::FAILED);
+    EXPECT_EQ(bake.error().code(), code);
+    EXPECT_THAT(bake.error().message(), HasSubstr(message));
+  }
+
+  void expect_server_bakes() { EXPECT_EQ(bake(kSucceed).state(), v1::SUCCEEDED); }
+
+  TemporaryFolder folder_;
+  TestServer server_{options_in(folder_.path())};
+  TestClient client_ = server_.client();
+};
+
+TEST_F(WorkersServiceTest, ReportsABadSceneAsTheWorkerDid) {
+  expect_failed(bake(kFailBadScene), grpc::INVALID_ARGUMENT, "mesh 'box': vertex 3 is not finite");
+  expect_server_bakes();
+}
+
+TEST_F(WorkersServiceTest, SurvivesAWorkerThatCrashesAndNamesTheSignal) {
+  expect_failed(bake(kCrash), grpc::INTERNAL, "the worker was killed by SIGSEGV");
+  expect_server_bakes();
+}
+
+TEST_F(WorkersServiceTest, ReportsTheExitCodeAndTheLastWords) {
+  const v1::Bake failed = bake(kExitWithMessage);
+  expect_failed(failed, grpc::INTERNAL, "exited with code 7");
+  expect_failed(failed, grpc::INTERNAL, kLastWords);
+}
+
+TEST_F(WorkersServiceTest, StopsAWorkerThatFallsSilent) {
+  expect_failed(bake(kHang), grpc::INTERNAL, "gave no sign of life for 1 s");
+  expect_server_bakes();
+}
+
+TEST_F(WorkersServiceTest, KillsAWorkerThatIgnoresCancel) {
+  const v1::Bake submitted = client_.submit(kIgnoreCancel);
+  client_.wait_for(submitted.name(), v1::FORM_FACTORS);
+  ASSERT_TRUE(client_.cancel(submitted.name()).ok());
+  const auto watched = client_.watch(submitted.name());
+  EXPECT_EQ(watched.finished().state(), v1::CANCELLED);
+  EXPECT_THAT(watched.events().back().message(), HasSubstr("did not stop within 0.2 s"));
+  expect_server_bakes();
+}
+
+TEST_F(WorkersServiceTest, RefusesAWorkerOfAnotherAttempt) {
+  expect_failed(bake_with(kWrongAttemptName), grpc::INTERNAL, "the worker exited with code 8");
+}
+
+TEST_F(WorkersServiceTest, RefusesAWorkerOfAnotherVersion) {
+  expect_failed(bake_with(kWrongVersionName), grpc::INTERNAL, "is version 0.0.0");
+}
+
+TEST_F(WorkersServiceTest, StopsAWorkerThatNeverConnects) {
+  expect_failed(bake_with(kMuteName), grpc::INTERNAL, "gave no sign of life for 1 s");
+}
+
+TEST_F(WorkersServiceTest, FailsWhenTheWorkerCannotBeStarted) {
+  TemporaryFolder folder;
+  service::BakeServerOptions options = options_in(folder.path());
+  options.queue.worker.program = folder.path() / "no-such-worker";
+  TestServer server(options);
+  TestClient client = server.client();
+  expect_failed(client.watch(client.submit(kSucceed).name()).finished(), grpc::INTERNAL, "no-such-worker");
+}
+
+TEST_F(WorkersServiceTest, RefusesAResultBlobThatDoesNotMatchItsDigest) {
+  expect_failed(bake(kSendWrongDigest), grpc::DATA_LOSS, "digest");
+  expect_server_bakes();
+}
+
+TEST_F(WorkersServiceTest, RefusesAResultThatNamesABlobNeverSent) {
+  expect_failed(bake(kNameUnsentBlob), grpc::INTERNAL, "never sent");
+}
+
+TEST_F(WorkersServiceTest, HandsDownOneSocketAndTheInputsAndNothingElse) {
+  const v1::Bake failed = bake(kListDescriptors);
+  std::string kinds = failed.error().message();
+  std::sort(kinds.begin(), kinds.end());
+  EXPECT_EQ(kinds, "FFS");  // the manifest, one mesh, the socket
+}
+
+TEST_F(WorkersServiceTest, HandsDownInputsThatCanBeReadAndNotWritten) {
+  expect_failed(bake(kReadInputs), grpc::INVALID_ARGUMENT, "good good ");
+}
+
+TEST_F(WorkersServiceTest, HoldsAWorkerToItsLimits) {
+  TemporaryFolder folder;
+  service::BakeServerOptions options = options_in(folder.path());
+  options.queue.worker.limits.cpu_seconds = 1;
+  options.queue.worker.silence_limit = 30s;
+  TestServer server(options);
+  TestClient client = server.client();
+  // A limit that a normal worker does not reach changes nothing.
+  EXPECT_EQ(client.watch(client.submit(kSucceed).name()).finished().state(), v1::SUCCEEDED);
+}
+
+}  // namespace
+}  // namespace radbake::testing

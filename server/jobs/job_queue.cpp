@@ -309,9 +309,8 @@ Result<std::string> JobQueue::start_plan(const store::Work& work, PlanDone on_do
 
 Result<std::string> JobQueue::start_plan_run(const store::Work& work, PlanDone on_done) {
   if (is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
-  const std::uint32_t num_plans = static_cast<std::uint32_t>(runs_.size()) - num_running_;
-  if (num_plans >= options_.max_running_plans) {
-    return Error{ErrorCode::kResourceExhausted, std::to_string(num_plans) +
+  if (plans_.size() >= options_.max_running_plans) {
+    return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
                                                     " plans are being made, max_running_plans is " +
                                                     std::to_string(options_.max_running_plans)};
   }

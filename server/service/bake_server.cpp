@@ -1,6 +1,7 @@
 #include "server/service/bake_server.h"
 
 #include <fcntl.h>
+#include <grpc/grpc.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
@@ -73,6 +74,9 @@ Result<void> BakeServer::open_stores(const BakeServerOptions& options) {
 }
 
 Result<void> BakeServer::listen(const BakeServerOptions& options) {
+  // Never paid back: when the last gRPC object goes, the library stops its threads, and one that polls for a socket's
+  // writes may be waited for as long as 10 s.
+  grpc_init();
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;

@@ -44,8 +44,6 @@ Result<std::uint64_t> available_bytes(json& object, const Entry& buffer, std::si
   if (uri.starts_with("data:")) return normalise_data_uri(uri, buffer);
   const Result<std::filesystem::path> file = resolve_uri(folder, uri);
   if (!file.ok()) return buffer.error(file.error().message);
-  // tinygltf takes a plus for a space.
-  for (std::size_t at = uri.find('+'); at != std::string::npos; at = uri.find('+', at)) uri.replace(at, 1, "%2B");
   std::error_code error;
   const std::uint64_t size = std::filesystem::file_size(*file, error);
   if (error) return buffer.error("the size of " + in_quotes(uri) + " cannot be read");

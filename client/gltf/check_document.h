@@ -15,8 +15,8 @@ namespace radbake::gltf {
 Result<nlohmann::json> parse_json(const std::string& text);
 
 /// Checks everything that the loader or we would otherwise trust: kinds, indices, sizes, ranges, extensions, URIs.
-/// Sets each buffer's byteLength to the size of what it names (a file may be longer than what is used of it), and its
-/// URI to the spelling that tinygltf understands.
+/// Sets each buffer's byteLength to the size of what it names (a file may be longer than what is used of it), and the
+/// media type of its data URI to one that tinygltf knows.
 ///
 /// After success every index is in range, every view lies inside its buffer, and every accessor inside its view.
 /// Errors: kInvalidArgument with the guilty entry and value.

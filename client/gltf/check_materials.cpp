@@ -9,8 +9,9 @@ namespace {
 using nlohmann::json;
 
 constexpr double kHalfPi = 1.5707963267948966;
-// Largest emissiveStrength and intensity: far above the sun's surface (1.6e9 nit), and no product overflows.
-constexpr double kMaxStrength = 1e12;
+// Largest emissiveStrength and intensity: above the sun's surface (1.6e9 nit), and within tinygltf's int, to which it
+// cuts whole numbers in extensions.
+constexpr double kMaxStrength = 2e9;
 
 Result<void> check_texture(const Entry& owner, const char* key, std::size_t num_textures) {
   RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> info, owner.member(key));

@@ -22,10 +22,21 @@ namespace {
 constexpr std::array kUsed = {"asset", "buffers",   "bufferViews", "accessors", "meshes",   "nodes",     "scenes",
                               "scene", "materials", "textures",    "images",    "samplers", "extensions"};
 
+// tinygltf takes a plus in a file's URI for a space.
+void escape_pluses(json& object) {
+  if (!object.contains("uri") || object["uri"].get_ref<const std::string&>().starts_with("data:")) return;
+  auto& uri = object["uri"].get_ref<std::string&>();
+  for (std::size_t at = uri.find('+'); at != std::string::npos; at = uri.find('+', at)) uri.replace(at, 1, "%2B");
+}
+
 json without_unused_parts(const json& document) {
   json reduced;
   for (const char* key : kUsed) {
     if (document.contains(key)) reduced[key] = document[key];
+  }
+  for (const char* list : {"buffers", "images"}) {
+    if (!reduced.contains(list)) continue;
+    for (json& object : reduced[list]) escape_pluses(object);
   }
   if (!reduced.contains("meshes")) return reduced;
   for (json& mesh : reduced["meshes"]) {

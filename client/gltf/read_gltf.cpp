@@ -79,6 +79,7 @@ class SceneReader {
     result_.scene.materials = std::move(materials_.materials());
     result_.scene.textures = std::move(materials_.textures());
     result_.num_triangles_dropped = counts_.num_triangles_dropped;
+    counts_.area_m2.resize(result_.scene.materials.size(), 0.0);  // the last ones may have lost all their triangles
     result_.warnings =
         scene_warnings(result_.scene.materials, materials_.facts(), counts_, ignored_extensions, options_);
     return std::move(result_);

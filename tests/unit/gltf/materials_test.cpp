@@ -158,6 +158,28 @@ TEST(GltfMaterials, DecodesNoTextureThatNoMeshUses) {
   EXPECT_THAT(warning_text(scene, "normal_map_not_simulated"), HasSubstr("'grey' (100 %"));
 }
 
+TEST(GltfMaterials, ReadsAnImageBesideTheScene) {
+  GltfBuilder file = textured("unused");
+  file.document["images"][0] = {{"uri", "walls/red+blue%20tiles.png"}};
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.path() / "walls");
+  folder.write("walls/red+blue tiles.png", "1 1 3 0.5 0.25 0.125");
+  const auto result = read_gltf(folder.write("scene.glb", file.glb()), decode_text_image, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_THAT(result->scene.textures.at(0).values, ElementsAre(0.5f, 0.25f, 0.125f));
+}
+
+TEST(GltfMaterials, DoesNotWarnOfAMaterialWithoutArea) {
+  GltfBuilder file = square();
+  file.add("materials", {{"name", "white"}});
+  const int line = file.add_indices({0, 1, 1});
+  file.document["meshes"][0]["primitives"].push_back(
+      {{"attributes", {{"POSITION", 0}}}, {"indices", line}, {"material", 1}});
+  const GltfScene scene = read(file);
+  EXPECT_EQ(scene.num_triangles_dropped, 1u);
+  EXPECT_EQ(warning_text(scene, "reflectance_limited"), "");
+}
+
 TEST(GltfMaterials, WarnsOfMetalOnlyWhereThereIsSome) {
   GltfBuilder file = textured("1 1 3 0.5 0.5 0");
   material(file)["pbrMetallicRoughness"]["metallicFactor"] = 1;

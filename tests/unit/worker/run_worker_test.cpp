@@ -39,10 +39,11 @@ Reports reports_of(const v1::WorkerCommand& order) {
   return reports;
 }
 
+/// The states in order. A stream begins as PREPARING and need not say so.
 std::vector<v1::BakeState> states_of(const Reports& reports) {
-  std::vector<v1::BakeState> states;
+  std::vector<v1::BakeState> states = {v1::PREPARING};
   for (const v1::WorkerReport& report : reports) {
-    if (report.has_progress() && (states.empty() || states.back() != report.progress().state())) {
+    if (report.has_progress() && states.back() != report.progress().state()) {
       states.push_back(report.progress().state());
     }
   }
@@ -62,7 +63,8 @@ TEST(RunWorker, SaysHelloFirst) {
 TEST(RunWorker, ReportsEveryStateInOrderAndFewSteps) {
   const BlobFiles files(small_scene());
   const Reports reports = reports_of(files.order(kBakes));
-  EXPECT_THAT(states_of(reports), ElementsAre(v1::FORM_FACTORS, v1::SOLVING, v1::GATHERING, v1::WRITING));
+  EXPECT_THAT(states_of(reports),
+              ElementsAre(v1::PREPARING, v1::FORM_FACTORS, v1::SOLVING, v1::GATHERING, v1::WRITING));
   // The bake tells 200 steps in no time at all; what may pass is a change of state, and ten a second.
   EXPECT_LT(std::count_if(reports.begin(), reports.end(), [](const auto& report) { return report.has_progress(); }),
             50);

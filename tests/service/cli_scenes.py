@@ -8,26 +8,31 @@ import struct
 
 # A unit square that faces up, two triangles.
 POSITIONS = [(0, 0, 0), (1, 0, 0), (1, 0, -1), (0, 0, -1)]
+TEXCOORDS = [(0.1, 0.9), (0.9, 0.9), (0.9, 0.1), (0.1, 0.1)]
 INDICES = [0, 1, 2, 0, 2, 3]
 
 
 def square(positions=POSITIONS, indices=INDICES, emissive=(1, 1, 1)):
     """A glTF of one square that glows."""
     payload = struct.pack("<12f", *(c for p in positions for c in p)) + struct.pack("<6H", *indices)
+    payload += struct.pack("<8f", *(c for t in TEXCOORDS for c in t))
     return {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": "floor", "mesh": 0}],
-        "meshes": [{"name": "square", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "meshes": [{"name": "square", "primitives": [
+            {"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "indices": 1, "material": 0}]}],
         "materials": [{"name": "glow", "emissiveFactor": list(emissive),
                        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0}}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, -1], "max": [1, 0, 0]},
-            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"},
+            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"}],
         "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48},
-                        {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
-        "buffers": [{"byteLength": 60,
+                        {"buffer": 0, "byteOffset": 48, "byteLength": 12},
+                        {"buffer": 0, "byteOffset": 60, "byteLength": 32}],
+        "buffers": [{"byteLength": 92,
                      "uri": "data:application/octet-stream;base64," + base64.b64encode(payload).decode()}],
     }
 
@@ -63,7 +68,6 @@ def _corrupt_image(scene):
     scene["textures"] = [{"source": 0}]
     scene["materials"][0]["emissiveTexture"] = {"index": 0}
     scene["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 2
-    scene["accessors"].append({"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC2"})
 
 
 def bad_scenes(glb: pathlib.Path):

@@ -1,0 +1,249 @@
+// The queue without a wire: workers are shell scripts, and the test takes the service's part.
+
+#include "server/jobs/job_queue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <thread>
+
+#include "common/base/version.h"
+#include "tests/unit/store/temporary_folder.h"
+
+namespace radbake::jobs {
+namespace {
+
+using namespace std::chrono_literals;
+using store::JobState;
+using ::testing::HasSubstr;
+
+constexpr auto kWaitLimit = 60s;
+
+/// Keeps the sockets, so that they stay open.
+class FakeGate : public WorkerGate {
+ public:
+  void adopt(store::FileDescriptor socket) override { sockets_.push_back(std::move(socket)); }
+
+ private:
+  std::vector<store::FileDescriptor> sockets_;
+};
+
+struct FakeLink : WorkerLink {
+  void start(const WorkOrder& order) override { num_inputs = order.inputs.size(); }
+  void cancel() override { is_cancelled = true; }
+  void accept() override { is_accepted = true; }
+  std::atomic<std::size_t> num_inputs = 0;
+  std::atomic<bool> is_cancelled = false, is_accepted = false;
+};
+
+class JobQueueTest : public ::testing::Test {
+ protected:
+  void SetUp() override { open("sleep 1000"); }
+
+  void write_worker(const std::string& script) {
+    std::ofstream(options_.worker.program) << "#!/bin/sh\n" << script << "\n";
+    chmod(options_.worker.program.c_str(), 0700);
+  }
+
+  /// Opens the queue as a server's start does, with workers that run a script.
+  void open(const std::string& script) {
+    queue_.reset();
+    jobs_.reset();
+    options_.worker.program = folder_.path() / "worker";
+    options_.spool_folder = folder_.path() / "spool";
+    options_.check_interval = 5ms;
+    options_.worker.exit_grace = 50ms;
+    options_.worker.disconnect_grace = 50ms;
+    write_worker(script);
+    content_ = std::move(store::ContentStore::open(folder_.path(), 1 << 20)).value();
+    jobs_ = std::move(store::JobStore::open(folder_.path() / "jobs.sqlite")).value();
+    queue_ = std::make_unique<JobQueue>(options_, *jobs_, *content_);
+    ASSERT_TRUE(queue_->start(gate_).ok());
+  }
+
+  std::shared_ptr<Job> submit(const std::string& request_id) {
+    auto job = queue_->submit({request_id, "body", "label", "key", {}});
+    EXPECT_TRUE(job.ok()) << job.error().message;
+    return std::move(job).value();
+  }
+
+  static bool wait_until(const std::function<bool()>& condition) {
+    const auto limit = std::chrono::steady_clock::now() + kWaitLimit;
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > limit) return false;
+      std::this_thread::sleep_for(1ms);
+    }
+    return true;
+  }
+  static bool wait_for(const std::shared_ptr<Job>& job, JobState state) {
+    return wait_until([&] { return job->record().state == state; });
+  }
+  static std::string error_of(const std::shared_ptr<Job>& job) {
+    EXPECT_TRUE(wait_for(job, JobState::kFailed));
+    return job->record().error ? job->record().error->message : "";
+  }
+
+  std::shared_ptr<WorkerRun> greet(const std::shared_ptr<Job>& job, std::uint32_t attempt = 1) {
+    EXPECT_TRUE(wait_for(job, JobState::kPreparing));
+    Result<std::shared_ptr<WorkerRun>> run = internal_error("not tried");
+    EXPECT_TRUE(wait_until([&] {
+      run = queue_->greet({job->record().name, attempt, kEngineVersion, kProtocolMajor}, link_);
+      return run.ok();
+    }));
+    return run.ok() ? *run : nullptr;
+  }
+
+  store::TemporaryFolder folder_;
+  QueueOptions options_;
+  FakeGate gate_;
+  std::shared_ptr<FakeLink> link_ = std::make_shared<FakeLink>();
+  std::unique_ptr<store::ContentStore> content_;
+  std::unique_ptr<store::JobStore> jobs_;
+  std::unique_ptr<JobQueue> queue_;
+};
+
+TEST_F(JobQueueTest, RunsJobsInTheOrderInWhichTheyCame) {
+  const auto first = submit("a"), second = submit("b"), third = submit("c"), fourth = submit("d");
+  const auto run = greet(first);
+  ASSERT_NE(run, nullptr);
+  ASSERT_TRUE(queue_->cancel(second->record().name).ok());  // from the middle of the queue
+  EXPECT_EQ(second->record().state, JobState::kCancelled);
+  EXPECT_EQ(third->record().state, JobState::kQueued);
+  ASSERT_TRUE(queue_->cancel(first->record().name).ok());
+  EXPECT_TRUE(wait_until([&] { return link_->is_cancelled.load(); }));
+  run->report_outcome({WorkOutcome::Kind::kCancelled, "", {}}, {});
+  EXPECT_TRUE(wait_for(first, JobState::kCancelled));
+  EXPECT_TRUE(wait_for(third, JobState::kPreparing));
+  EXPECT_EQ(second->record().state, JobState::kCancelled);
+  EXPECT_EQ(fourth->record().state, JobState::kQueued);
+}
+
+TEST_F(JobQueueTest, PublishesAResultOnceAndFreesThePlaceOfAWorkerThatDoesNotExit) {
+  const auto first = submit("a"), second = submit("b");
+  const auto run = greet(first);
+  ASSERT_NE(run, nullptr);
+  JobProgress progress;
+  progress.state = JobState::kSolving;
+  run->report_progress(progress);
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  run->report_outcome({WorkOutcome::Kind::kFailed, "", internal_error("too late")}, {});
+  EXPECT_TRUE(wait_for(first, JobState::kSucceeded));
+  EXPECT_TRUE(wait_until([&] { return link_->is_accepted.load(); }));
+  EXPECT_EQ(first->record().result, "result");
+  const auto events = first->events_after(0);
+  ASSERT_EQ(events.size(), 4u);
+  EXPECT_EQ(events[2].state, JobState::kSolving);
+  EXPECT_TRUE(wait_for(second, JobState::kPreparing));
+}
+
+TEST_F(JobQueueTest, RefusesASecondWorkerAndAnotherAttempt) {
+  const auto job = submit("a");
+  greet(job);
+  const std::string name = job->record().name;
+  for (const std::uint32_t attempt : {1u, 2u}) {
+    const auto refused = queue_->greet({name, attempt, kEngineVersion, kProtocolMajor}, link_);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::kFailedPrecondition);
+  }
+  EXPECT_FALSE(queue_->greet({"bakes/none", 1, kEngineVersion, kProtocolMajor}, link_).ok());
+}
+
+TEST_F(JobQueueTest, SaysHowAWorkerEnded) {
+  write_worker("echo first >&2; echo out of luck >&2; exit 3");
+  EXPECT_THAT(error_of(submit("a")), ::testing::AllOf(HasSubstr("exited with code 3"), HasSubstr("out of luck")));
+  write_worker("kill -ABRT $$");
+  EXPECT_THAT(error_of(submit("b")), HasSubstr("was killed by SIGABRT"));
+  write_worker("exit 0");
+  EXPECT_THAT(error_of(submit("c")), HasSubstr("exited with code 0"));
+}
+
+TEST_F(JobQueueTest, StopsAWorkerThatLostItsConnection) {
+  const auto job = submit("a");
+  greet(job)->report_disconnected();
+  EXPECT_THAT(error_of(job), HasSubstr("closed its connection without a result"));
+}
+
+TEST_F(JobQueueTest, KillsTheChildrenOfAWorkerWithIt) {
+  write_worker("sleep 1000 >/dev/null 2>&1 & echo $! > " + (folder_.path() / "child").string() + "; exit 5");
+  error_of(submit("a"));
+  int child = 0;
+  std::ifstream(folder_.path() / "child") >> child;
+  ASSERT_GT(child, 0);
+  // Gone, or waiting as a zombie for an init that reaps.
+  EXPECT_TRUE(wait_until([&] {
+    std::string pid, name, state;
+    std::ifstream(("/proc/" + std::to_string(child) + "/stat")) >> pid >> name >> state;
+    return state.empty() || state == "Z" || state == "X";
+  }));
+}
+
+TEST_F(JobQueueTest, RefusesJobsBeyondItsLimitButNotTheSameRequest) {
+  options_.max_queued = 1;
+  open("sleep 1000");
+  const auto running = submit("a");
+  ASSERT_TRUE(wait_for(running, JobState::kPreparing));
+  const auto waiting = submit("b");
+  EXPECT_EQ(queue_->submit({"c", "body", "label", "key", {}}).error().code, ErrorCode::kResourceExhausted);
+  EXPECT_EQ(submit("b")->record().name, waiting->record().name);
+}
+
+TEST_F(JobQueueTest, QueuesRunningJobsAgainWhenItDrains) {
+  const auto running = submit("a"), waiting = submit("b");
+  ASSERT_TRUE(wait_for(running, JobState::kPreparing));
+  queue_->drain();
+  EXPECT_EQ(running->record().state, JobState::kQueued);
+  EXPECT_TRUE(running->is_closing());
+  EXPECT_EQ(queue_->submit({"c", "body", "label", "key", {}}).error().code, ErrorCode::kUnavailable);
+  const std::string name = running->record().name;
+  open("sleep 1000");
+  const auto again = *queue_->find(name);
+  EXPECT_TRUE(wait_for(again, JobState::kPreparing));
+  EXPECT_EQ(again->record().attempt, 2u);
+  EXPECT_EQ(again->record().lost_attempts, 0u);  // stopping in good order costs no attempt
+}
+
+TEST_F(JobQueueTest, GivesAJobUpThatTookTheServerDownTooOften) {
+  queue_->drain();
+  const std::string name = jobs_->create({"a", "body", "label", "key", {}})->name;
+  // As a server that died leaves it.
+  ASSERT_TRUE(jobs_->append_event(name, {JobState::kGathering, 3, 2, "", "", {}}).ok());
+  open("sleep 1000");
+  const store::JobRecord record = (*queue_->find(name))->record();
+  EXPECT_EQ(record.state, JobState::kFailed);
+  EXPECT_THAT(record.error->message, HasSubstr("3 times"));
+}
+
+TEST(TileSpool, GivesTilesBackInTheirOrder) {
+  store::TemporaryFolder folder;
+  auto spool = std::move(TileSpool::create(folder.path())).value();
+  ASSERT_TRUE(spool->append("one").ok());
+  ASSERT_TRUE(spool->append("").ok());
+  ASSERT_TRUE(spool->append(std::string("t\0o", 3)).ok());
+  ASSERT_EQ(spool->num_tiles(), 3u);
+  EXPECT_EQ(*spool->read(2), std::string("t\0o", 3));
+  EXPECT_EQ(*spool->read(0), "one");
+  EXPECT_EQ(*spool->read(1), "");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));  // no name: nothing outlives the server
+}
+
+TEST(Job, KeepsOnlyTheLatestProgress) {
+  Job job({}, {});
+  int num_calls = 0;
+  const auto subscription = job.subscribe([&] { ++num_calls; });
+  for (int i = 1; i <= 5; ++i) {
+    JobProgress progress;
+    progress.fraction = 0.1 * i;
+    job.set_progress(progress);
+  }
+  EXPECT_EQ(job.progress().version, 5u);
+  EXPECT_EQ(job.progress().progress.fraction, 0.5);
+  EXPECT_EQ(num_calls, 5);
+  job.unsubscribe(subscription);
+  job.set_progress({});
+  EXPECT_EQ(num_calls, 5);
+}
+
+}  // namespace
+}  // namespace radbake::jobs

@@ -1,0 +1,165 @@
+#include "server/store/job_store.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/store/temporary_folder.h"
+
+namespace radbake::store {
+namespace {
+
+class JobStoreTest : public ::testing::Test {
+ protected:
+  void SetUp() override { open(); }
+
+  void open() {
+    store_.reset();
+    auto store = JobStore::open(file_);
+    ASSERT_TRUE(store.ok()) << store.error().message;
+    store_ = std::move(store).value();
+  }
+
+  static NewJob new_job(const std::string& request_id) {
+    const Digest manifest = digest_of(std::string("manifest")), mesh = digest_of(std::string("mesh"));
+    return {request_id, "body", "box.glb", "key", {manifest, std::string("set\0tings", 9), "run", {manifest, mesh}}};
+  }
+
+  JobRecord create(const std::string& request_id) {
+    auto job = store_->create(new_job(request_id));
+    EXPECT_TRUE(job.ok()) << job.error().message;
+    return std::move(job).value();
+  }
+
+  TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_.path() / "jobs.sqlite";
+  std::unique_ptr<JobStore> store_;
+};
+
+TEST_F(JobStoreTest, KeepsEverythingOfAJobAcrossAStart) {
+  const std::string name = create("a").name;
+  ASSERT_TRUE(store_->append_event(name, {JobState::kPreparing, 1, 0, "starts", "", {}}).ok());
+  ASSERT_TRUE(store_->append_event(name, {JobState::kSucceeded, 1, 0, "done", std::string("re\0sult", 7), {}}).ok());
+  open();
+  const auto job = store_->get(name);
+  ASSERT_TRUE(job.ok());
+  const NewJob expected = new_job("a");
+  EXPECT_EQ(job->label, expected.label);
+  EXPECT_EQ(job->bake_key, expected.bake_key);
+  EXPECT_EQ(job->work.manifest, expected.work.manifest);
+  EXPECT_EQ(job->work.settings, expected.work.settings);
+  EXPECT_EQ(job->work.run, expected.work.run);
+  EXPECT_EQ(job->work.inputs, expected.work.inputs);
+  EXPECT_EQ(job->state, JobState::kSucceeded);
+  EXPECT_EQ(job->result, std::string("re\0sult", 7));
+  EXPECT_EQ(job->last_sequence, 3u);
+  EXPECT_FALSE(job->error.has_value());
+  EXPECT_GT(job->finished_unix_ms, 0);
+}
+
+TEST_F(JobStoreTest, KnowsARequestByItsIdAndBody) {
+  EXPECT_FALSE((*store_->find_request("a", "body")).has_value());
+  const std::string name = create("a").name;
+  EXPECT_EQ((*store_->find_request("a", "body"))->name, name);
+  EXPECT_EQ(store_->find_request("a", "another body").error().code, ErrorCode::kAlreadyExists);
+  EXPECT_EQ(store_->create(new_job("a")).error().code, ErrorCode::kAlreadyExists);
+  EXPECT_EQ(store_->list(10, 0)->size(), 1u);
+}
+
+TEST_F(JobStoreTest, NumbersEventsWithoutGapsAndReadsThemFromAnyOn) {
+  const std::string name = create("a").name, other = create("b").name;
+  ASSERT_TRUE(store_->append_event(name, {JobState::kPreparing, 1, 0, "one", "", {}}).ok());
+  ASSERT_TRUE(store_->append_event(other, {JobState::kCancelled, 1, 0, "other", "", {}}).ok());
+  ASSERT_TRUE(store_->append_event(name, {JobState::kSolving, 1, 0, "two", "", {}}).ok());
+  const auto all = store_->events_after(name, 0);
+  ASSERT_EQ(all->size(), 3u);
+  for (std::size_t i = 0; i < all->size(); ++i) EXPECT_EQ((*all)[i].sequence, i + 1);
+  EXPECT_EQ((*all)[0].state, JobState::kQueued);
+  const auto rest = store_->events_after(name, 2);
+  ASSERT_EQ(rest->size(), 1u);
+  EXPECT_EQ(rest->front().message, "two");
+  EXPECT_TRUE(store_->events_after(name, 3)->empty());
+}
+
+TEST_F(JobStoreTest, KeepsTheErrorOfAFailure) {
+  const std::string name = create("a").name;
+  const Error error{ErrorCode::kInvalidArgument, "mesh 'box' has no area"};
+  ASSERT_TRUE(store_->append_event(name, {JobState::kFailed, 1, 0, "failed", "", error}).ok());
+  open();
+  const auto job = store_->get(name);
+  ASSERT_TRUE(job->error.has_value());
+  EXPECT_EQ(job->error->code, error.code);
+  EXPECT_EQ(job->error->message, error.message);
+}
+
+TEST_F(JobStoreTest, FindsUnfinishedJobsOldestFirst) {
+  const std::string a = create("a").name, b = create("b").name, c = create("c").name;
+  ASSERT_TRUE(store_->append_event(b, {JobState::kCancelled, 1, 0, "", "", {}}).ok());
+  ASSERT_TRUE(store_->append_event(c, {JobState::kGathering, 2, 1, "", "", {}}).ok());
+  open();
+  const auto jobs = store_->unfinished();
+  ASSERT_EQ(jobs->size(), 2u);
+  EXPECT_EQ((*jobs)[0].name, a);
+  EXPECT_EQ((*jobs)[1].name, c);
+  EXPECT_EQ((*jobs)[1].attempt, 2u);
+  EXPECT_EQ((*jobs)[1].lost_attempts, 1u);
+  EXPECT_EQ((*jobs)[1].work.inputs.size(), 2u);
+}
+
+TEST_F(JobStoreTest, ListsNewestFirstBelowAnId) {
+  std::vector<std::string> names;
+  for (const char* id : {"a", "b", "c"}) names.push_back(create(id).name);
+  const auto page = store_->list(2, 0);
+  ASSERT_EQ(page->size(), 2u);
+  EXPECT_EQ((*page)[0].name, names[2]);
+  EXPECT_EQ((*page)[1].name, names[1]);
+  const auto rest = store_->list(2, page->back().id);
+  ASSERT_EQ(rest->size(), 1u);
+  EXPECT_EQ(rest->front().name, names[0]);
+}
+
+TEST_F(JobStoreTest, SaysThatAJobDoesNotExist) {
+  EXPECT_EQ(store_->get("bakes/none").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(store_->append_event("bakes/none", {}).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(JobStoreTest, SyncsEveryCommitAndMigratesAnEmptyFile) {
+  store_.reset();
+  auto database = Database::open(file_);
+  ASSERT_TRUE(database.ok());
+  const auto pragma = [&](const std::string& name) {
+    auto query = database->prepare("PRAGMA " + name);
+    EXPECT_TRUE(*query->step());
+    return query->bytes(0);
+  };
+  EXPECT_EQ(pragma("journal_mode"), "wal");
+  EXPECT_EQ(pragma("synchronous"), "2");  // FULL
+  EXPECT_EQ(pragma("foreign_keys"), "1");
+  EXPECT_EQ(pragma("user_version"), "1");
+}
+
+TEST_F(JobStoreTest, RefusesAFileOfANewerVersionAndAFileThatIsNone) {
+  store_.reset();
+  {
+    auto database = Database::open(file_);
+    ASSERT_TRUE(database->execute("PRAGMA user_version=1000").ok());
+  }
+  const auto newer = JobStore::open(file_);
+  ASSERT_FALSE(newer.ok());
+  EXPECT_EQ(newer.error().code, ErrorCode::kFailedPrecondition);
+  EXPECT_THAT(newer.error().message, ::testing::HasSubstr("1000"));
+  EXPECT_FALSE(JobStore::open(folder_.path() / "no such folder" / "jobs.sqlite").ok());
+}
+
+TEST_F(JobStoreTest, UndoesAllOfATransactionThatFails) {
+  store_.reset();
+  auto database = Database::open(file_);
+  const auto done = database->in_transaction([&]() -> Result<void> {
+    RADBAKE_RETURN_IF_ERROR(database->execute("CREATE TABLE half (x)"));
+    return internal_error("stopped in the middle");
+  });
+  EXPECT_FALSE(done.ok());
+  EXPECT_FALSE(database->execute("SELECT * FROM half").ok());
+}
+
+}  // namespace
+}  // namespace radbake::store

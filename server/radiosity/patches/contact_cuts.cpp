@@ -111,11 +111,9 @@ void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::ve
 
 void ContactCutter::find_cuts(std::span<const Piece> pieces, std::vector<Cut>& cuts) {
   cuts.clear();
-  // Cells of merged groups have no grid to cut in.
-  const auto& grid = patches_.grids_[patches_.group_of_[pieces.front().triangle]];
+  // Merged groups have no grid to cut in: their coordinates do not vary.
   const auto& map = patches_.maps_[pieces.front().triangle];
-  const bool has_grid = dot(map.per_u, map.per_u) > 0 || dot(map.per_v, map.per_v) > 0;
-  if (grid.cells == std::array<std::int32_t, 3>{1, 1, 1} && !has_grid) return;
+  if (dot(map.per_u, map.per_u) == 0 && dot(map.per_v, map.per_v) == 0) return;
 
   // A ball around the cell.
   Vec3 low, high;

@@ -161,11 +161,13 @@ class PatchBuilder {
     std::map<Key, std::uint32_t> merged;
     std::vector<std::uint32_t> grid_of_group(planes_.size());
     cell_size_.clear();
+    grid_is_merged_.clear();
     for (std::uint32_t g = 0; g < planes_.size(); ++g) {
       const Plane& plane = planes_[g];
       Patches::Grid grid;
       Vec3 cell_size{1, 1, 1};
-      if (merging != Merging::kNone && is_small(plane, edge)) {
+      const bool can_merge = merging != Merging::kNone && is_small(plane, edge);
+      if (can_merge) {
         const Material& material = surfaces_.material(plane.first_triangle);
         const int own_material = surfaces_.mesh(plane.first_triangle).material;
         const auto voxel = [edge](double x) { return static_cast<std::int64_t>(std::floor((x + 1) / edge)); };
@@ -193,6 +195,7 @@ class PatchBuilder {
         result_.dense_.resize(result_.dense_.size() + static_cast<std::size_t>(num_cells), kNoPatch);
       }
       result_.grids_.push_back(grid);
+      grid_is_merged_.push_back(can_merge);
       cell_size_.push_back(cell_size);
     }
     result_.group_of_.resize(surfaces_.size());
@@ -214,22 +217,19 @@ class PatchBuilder {
 
   void cut_triangle(std::uint32_t t) {
     const std::uint32_t g = result_.group_of_[t];
-    const Patches::Grid grid = result_.grids_[g];
+    const bool is_merged = grid_is_merged_[g];
     const Plane& plane = planes_[groups_.group_of[t]];
     const auto& c = surfaces_.corners[t];
     std::array<Vec3, 3> at;
     for (int k = 0; k < 3; ++k) {
       const Vec3 q = in_plane(plane, c[k]) - plane.low;
       at[k] = {q.x / cell_size_[g].x, q.y / cell_size_[g].y, q.z / cell_size_[g].z};
-      for (int axis = 0; axis < 3; ++axis) {
-        if (grid.cells[axis] == 1) at[k][axis] = 0.5;
-      }
+      if (is_merged) at[k] = {0.5, 0.5, 0.5};
     }
     result_.maps_[t] = {at[0], at[1] - at[0], at[2] - at[0]};
 
     const GridPolygon whole = {{{0, 0}, at[0]}, {{1, 0}, at[1]}, {{0, 1}, at[2]}};
     const double cell_area = cell_size_[g].x * cell_size_[g].y;
-    const bool is_merged = grid.cells == std::array<std::int32_t, 3>{1, 1, 1};
     const double negligible = is_merged ? 0 : kNegligiblePart * std::min(cell_area, surfaces_.areas[t]);
     std::array<std::int32_t, 3> index{};
     cut_axis(t, g, whole, 0, index, negligible);
@@ -325,7 +325,8 @@ class PatchBuilder {
   std::size_t num_group_sides_ = 0;
   // Of the current attempt:
   Patches result_;
-  std::vector<Vec3> cell_size_;  ///< [grids]
+  std::vector<Vec3> cell_size_;       ///< [grids]
+  std::vector<char> grid_is_merged_;  ///< [grids]
   std::vector<std::uint32_t> cell_of_piece_;
   std::vector<char> cell_is_double_sided_;
   std::size_t count_ = 0;

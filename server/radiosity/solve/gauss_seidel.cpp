@@ -42,15 +42,16 @@ class BoundEstimator {
         const Vec3 r = problem_.source[i] + reflected - radiosity[i];
         const Vec3 magnitude = problem_.source[i] + reflected + radiosity[i];
         const double roundings = static_cast<double>(transport_.row_length(patch)) + 4;
-        terms_[i] = {std::max({std::fabs(r.x), std::fabs(r.y), std::fabs(r.z)}),
+        const double largest = std::max({std::fabs(r.x), std::fabs(r.y), std::fabs(r.z)});
+        // A maximum passes over NaN: say infinity instead.
+        terms_[i] = {is_finite(r) ? largest : std::numeric_limits<double>::infinity(),
                      roundings * kRoundoff * max_component(magnitude)};
       }
     });
     ErrorBound bound;
     double rounding = 0, flux = 0, area = 0;
     for (std::size_t i = 0; i < terms_.size(); ++i) {
-      // A comparison that is false for NaN must not hide it.
-      bound.residual = terms_[i].residual <= bound.residual ? bound.residual : terms_[i].residual;
+      bound.residual = std::max(bound.residual, terms_[i].residual);
       rounding = std::max(rounding, terms_[i].rounding);
       flux += areas[i] * mean_component(radiosity[i]);
       area += areas[i];

@@ -1,0 +1,130 @@
+#include "server/radiosity/patches/patches.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <random>
+#include <set>
+
+#include "server/radiosity/survey/survey.h"
+#include "tests/scenes/rooms.h"
+
+namespace radbake::radiosity {
+namespace {
+
+/// A scene cut into patches.
+struct Cut {
+  Scene scene;
+  SurveyedScene surveyed;
+  std::unique_ptr<Visibility> visibility;
+  Patches patches;
+
+  Cut(Scene s, double edge_metres, std::size_t max_patches)
+      : scene(std::move(s)),
+        surveyed(survey_scene(scene).value()),
+        visibility(make_embree_visibility(surveyed.surfaces.corners)),
+        patches(make_patches(surveyed.surfaces, *visibility,
+                             {edge_metres / surveyed.surfaces.metres_per_unit, max_patches})) {}
+};
+
+double total_area(const Patches& patches) {
+  double area = 0;
+  for (std::uint32_t i = 0; i < patches.num_cells(); ++i) area += patches.area(i);
+  return area;
+}
+
+constexpr double kRounding = 1e-9;
+
+TEST(Patches, TileTheSurfaceAndFindTheirOwnSamples) {
+  const Cut cut(tests::furnace_room(0.5), 0.25, 10000);
+  const double area = std::accumulate(cut.surveyed.surfaces.areas.begin(), cut.surveyed.surfaces.areas.end(), 0.0);
+  EXPECT_NEAR(total_area(cut.patches) / area, 1, kRounding);
+  int strays = 0;
+  for (std::uint32_t i = 0; i < cut.patches.size(); ++i) {
+    for (const double x : {0.0137, 0.317, 0.621, 0.989}) {
+      const SurfacePoint p = cut.patches.sample(i, x, 0.4);
+      strays += cut.patches.find(p.triangle, p.u, p.v, cut.patches.is_back(i)) != i;
+    }
+  }
+  EXPECT_EQ(strays, 0);
+  // A wall of 4 x 3 m is a regular grid of 16 x 12.
+  EXPECT_NEAR(cut.patches.area(0) * cut.surveyed.surfaces.metres_per_unit * cut.surveyed.surfaces.metres_per_unit,
+              0.25 * 0.25, kRounding);
+}
+
+TEST(Patches, OfSingleSidedSurfacesHaveNoBack) {
+  const Cut cut(tests::furnace_room(0.5), 0.5, 10000);
+  EXPECT_EQ(cut.patches.size(), cut.patches.num_cells());
+  EXPECT_EQ(cut.patches.find(0, 0.3, 0.3, true), kNoPatch);
+}
+
+TEST(Patches, OfDoubleSidedSurfacesHaveAPatchOnEachSide) {
+  Scene scene = tests::furnace_room(0.5);
+  for (Material& material : scene.materials) material.is_double_sided = true;
+  const Cut cut(std::move(scene), 0.5, 10000);
+  EXPECT_EQ(cut.patches.size(), 2 * cut.patches.num_cells());
+  const std::uint32_t back = cut.patches.find(0, 0.3, 0.3, true);
+  EXPECT_TRUE(cut.patches.is_back(back));
+  EXPECT_EQ(cut.patches.area(back), cut.patches.area(cut.patches.find(0, 0.3, 0.3, false)));
+}
+
+TEST(Patches, KeepTheBoundForAMillionSlivers) {
+  // Unconnected slivers in all directions: nothing to merge by neighbourhood.
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> any(-1, 1);
+  Scene scene;
+  Material straw;
+  straw.emissive = {1, 1, 1};
+  scene.materials.push_back(straw);
+  Mesh mesh;
+  mesh.name = "straw";
+  constexpr std::uint32_t kSlivers = 1'000'000;
+  for (std::uint32_t i = 0; i < kSlivers; ++i) {
+    const Vec3 a{10 * any(random), 10 * any(random), 10 * any(random)};
+    const Vec3 along{0.1 * any(random), 0.1 * any(random), 0.1 * any(random)};
+    const Vec3 aside{0.001 * any(random), 0.001 * any(random), 0.001 * any(random)};
+    mesh.positions.insert(mesh.positions.end(), {a, a + along, a + aside});
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  scene.meshes.push_back(std::move(mesh));
+  const Cut cut(std::move(scene), 0.01, 4096);
+  EXPECT_LE(cut.patches.size(), 4096u);
+  EXPECT_GE(cut.patches.size(), 500u);
+  const double area = std::accumulate(cut.surveyed.surfaces.areas.begin(), cut.surveyed.surfaces.areas.end(), 0.0);
+  EXPECT_NEAR(total_area(cut.patches) / area, 1, 1e-6);
+}
+
+TEST(Patches, KeepTheSmallestBoundForManyMaterials) {
+  Scene scene = tests::furnace_room(0.5);
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    scene.materials.push_back(scene.materials[0]);
+    scene.meshes[m].material = static_cast<int>(scene.materials.size()) - 1;
+  }
+  EXPECT_LE(Cut(std::move(scene), 0.01, 64).patches.size(), 64u);
+}
+
+TEST(Patches, AreCutWhereAWallStandsOnTheFloor) {
+  // A floor of 4 x 4 m cut into one cell; a wall across it at x = 1.5, from end to end.
+  tests::RoomBuilder builder(4);
+  const int grey = builder.add_material("grey", {0.5, 0.5, 0.5}, {1, 1, 1});
+  builder.add_quad("floor", {0, 0, 0}, {0, 0, 4}, {4, 0, 0}, grey);
+  builder.add_quad("wall", {1.5, 0, 0}, {0, 0, 4}, {0, 2, 0}, grey);
+  const Cut cut(builder.scene(), 4, 64);
+  std::set<std::uint32_t> left, right;
+  for (std::uint32_t t = 0; t < 2; ++t) {
+    for (double u = 0.05; u < 1; u += 0.1) {
+      for (double v = 0.05; u + v < 1; v += 0.1) {
+        const double x = cut.surveyed.surfaces.position({t, u, v}).x * cut.surveyed.surfaces.metres_per_unit +
+                         cut.surveyed.surfaces.centre.x;
+        (x < 1.5 ? left : right).insert(cut.patches.find(t, u, v, false));
+      }
+    }
+  }
+  ASSERT_EQ(left.size(), 1u);
+  ASSERT_EQ(right.size(), 1u);
+  EXPECT_NE(*left.begin(), *right.begin());
+  EXPECT_NEAR(cut.patches.area(*left.begin()) / cut.patches.area(*right.begin()), 1.5 / 2.5, kRounding);
+}
+
+}  // namespace
+}  // namespace radbake::radiosity

@@ -1,0 +1,111 @@
+#include "server/radiosity/visibility/visibility.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace radbake::radiosity {
+namespace {
+
+std::vector<Corners> random_triangles(int n, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> place(-1, 1), size(-0.3, 0.3);
+  std::vector<Corners> triangles;
+  for (int i = 0; i < n; ++i) {
+    const Vec3 a{place(random), place(random), place(random)};
+    triangles.push_back(
+        {a, a + Vec3{size(random), size(random), size(random)}, a + Vec3{size(random), size(random), size(random)}});
+  }
+  return triangles;
+}
+
+std::vector<Ray> random_rays(int n, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<float> any(-1, 1);
+  std::vector<Ray> rays;
+  for (int i = 0; i < n; ++i) {
+    rays.push_back({{any(random), any(random), any(random)}, {any(random), any(random), any(random)}});
+  }
+  return rays;
+}
+
+// Single and double precision may disagree on rays that graze an edge: about 1 in 1e5 here.
+TEST(Visibility, OfEmbreeAgreesWithBruteForce) {
+  constexpr int kRays = 20000;
+  constexpr int kGrazing = 4;
+  const auto triangles = random_triangles(300, 1);
+  const auto embree = make_embree_visibility(triangles);
+  const auto slow = make_brute_force_visibility(triangles);
+  std::vector<Ray> rays = random_rays(kRays, 2);
+  std::vector<Hit> fast_hits(kRays), slow_hits(kRays);
+  embree->trace(rays, fast_hits);
+  slow->trace(rays, slow_hits);
+  int different = 0, hits = 0;
+  for (int i = 0; i < kRays; ++i) {
+    different += fast_hits[i].triangle != slow_hits[i].triangle;
+    hits += slow_hits[i].triangle != kNoHit;
+    if (fast_hits[i].triangle == slow_hits[i].triangle && slow_hits[i].triangle != kNoHit) {
+      EXPECT_NEAR(fast_hits[i].u, slow_hits[i].u, 1e-3);
+      EXPECT_NEAR(fast_hits[i].v, slow_hits[i].v, 1e-3);
+    }
+  }
+  EXPECT_GT(hits, kRays / 10);
+  EXPECT_LE(different, kGrazing);
+
+  for (Ray& ray : rays) ray.max_distance = 0.5f;
+  std::vector<std::uint8_t> fast_blocked(kRays), slow_blocked(kRays);
+  embree->blocked(rays, fast_blocked);
+  slow->blocked(rays, slow_blocked);
+  different = 0;
+  for (int i = 0; i < kRays; ++i) different += fast_blocked[i] != slow_blocked[i];
+  EXPECT_LE(different, kGrazing);
+}
+
+TEST(Visibility, FindsEveryTriangleNearAPoint) {
+  const auto triangles = random_triangles(500, 3);
+  const auto embree = make_embree_visibility(triangles);
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> any(-1, 1);
+  std::vector<std::uint32_t> found;
+  for (int k = 0; k < 200; ++k) {
+    const Vec3 point{any(random), any(random), any(random)};
+    const double distance = 0.2;
+    embree->triangles_near(point, distance, found);
+    EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      // A corner within the distance is enough to be near.
+      const bool has_near_corner =
+          std::any_of(triangles[t].begin(), triangles[t].end(), [&](Vec3 c) { return length(c - point) <= distance; });
+      EXPECT_TRUE(!has_near_corner || std::binary_search(found.begin(), found.end(), t));
+    }
+  }
+}
+
+TEST(Visibility, LetsNoRayEscapeBetweenTrianglesOfAClosedBox) {
+  // A cube of 12 triangles, rays from its middle at its edges and corners among others.
+  std::vector<Corners> box;
+  const Vec3 corner[8] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
+                          {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
+  const int quads[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {2, 3, 7, 6}, {1, 2, 6, 5}, {0, 3, 7, 4}};
+  for (const auto& q : quads) {
+    box.push_back({corner[q[0]], corner[q[1]], corner[q[2]]});
+    box.push_back({corner[q[0]], corner[q[2]], corner[q[3]]});
+  }
+  const auto embree = make_embree_visibility(box);
+  std::vector<Ray> rays;
+  for (int i = -50; i <= 50; ++i) {
+    for (int j = -50; j <= 50; ++j) {
+      // Directions on and around the box's edges and diagonals.
+      rays.push_back({{0.1f, -0.2f, 0.3f}, {1.0f, static_cast<float>(i) / 50, static_cast<float>(j) / 50}});
+      rays.push_back({{0, 0, 0}, {static_cast<float>(i) / 50, 1.0f, static_cast<float>(j) / 50}});
+      rays.push_back({{0, 0, 0}, {1.0f, 1.0f, static_cast<float>(j) / 50}});
+    }
+  }
+  std::vector<Hit> hits(rays.size());
+  embree->trace(rays, hits);
+  for (const Hit& hit : hits) EXPECT_NE(hit.triangle, kNoHit);
+}
+
+}  // namespace
+}  // namespace radbake::radiosity

@@ -65,10 +65,14 @@ Result<void> read_attribute(const draco::Mesh& mesh, const std::string& name, in
     return corrupt(name + " has " + std::to_string(attribute->num_components()) + " components, not " +
                    std::to_string(N));
   }
+  // Not by ConvertValue: that looks at a flag which corrupt data leaves as neither true nor false.
+  if (attribute->data_type() != draco::DT_FLOAT32) {
+    return invalid_argument("Draco data holds " + name + " as integers; quantised meshes are not read by this version");
+  }
   for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
     const draco::AttributeValueIndex value = attribute->mapped_index(point);
     std::array<float, N> numbers;
-    if (value.value() >= attribute->size() || !attribute->ConvertValue<float, N>(value, numbers.data())) {
+    if (value.value() >= attribute->size() || !attribute->GetValue<float, N>(value, &numbers)) {
       return corrupt(name + " of vertex " + std::to_string(point.value()) + " has no value");
     }
     sink(numbers);

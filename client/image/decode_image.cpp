@@ -76,7 +76,8 @@ Result<TexturePlane> decode(std::span<const std::byte> bytes, const char* extens
   for (int y = 0; y < spec.height; y += band_rows) {
     const int rows = std::min(band_rows, spec.height - y);
     if (!input->read_scanlines(0, 0, spec.y + y, spec.y + y + rows, 0, 0, n, OIIO::TypeDesc::UINT16, band.data())) {
-      return invalid_argument("cannot be decoded: " + input->geterror());
+      return invalid_argument("cannot be decoded: rows " + std::to_string(y) + " to " + std::to_string(y + rows - 1) +
+                              " are corrupt");
     }
     for (int r = 0; r < rows; ++r) {
       const std::uint16_t* pixel = &band[std::size_t(r) * std::size_t(spec.width) * std::size_t(n)];

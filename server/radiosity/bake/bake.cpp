@@ -208,6 +208,7 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
   tbb::task_arena arena(threads);
   std::optional<Result<BakeOutcome>> outcome;
   arena.execute([&] {
+    const auto start = ProgressMeter::Clock::now();
     observer.on_progress({});
     auto prepared = prepare_scene(scene, options, stop);
     if (!prepared.ok()) {
@@ -215,7 +216,7 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
       return;
     }
     const Preparation& ready = **prepared;
-    ProgressMeter progress(observer, row_rays(ready.plan, ready.patches), gather_rays(ready.plan));
+    ProgressMeter progress(observer, start, row_rays(ready.plan, ready.patches), gather_rays(ready.plan));
     outcome.emplace(Bake(scene, options, ready, progress, stop).run());
   });
   return std::move(*outcome);

@@ -24,7 +24,8 @@ double seconds(std::chrono::steady_clock::duration d) { return std::chrono::dura
 
 }  // namespace
 
-ProgressMeter::ProgressMeter(BakeObserver& observer, double row_rays, double gather_rays) : observer_(observer) {
+ProgressMeter::ProgressMeter(BakeObserver& observer, Clock::time_point start, double row_rays, double gather_rays)
+    : observer_(observer), start_(start), stage_start_(start) {
   const double traced = std::max(row_rays + gather_rays, 1.0);
   row_share_ = (1 - kPreparingShare - kSolvingShare) * row_rays / traced;
   gather_share_ = (1 - kPreparingShare - kSolvingShare) * gather_rays / traced;

@@ -11,7 +11,10 @@ namespace radbake::radiosity {
 /// The stages' shares are their numbers of rays; the estimate corrects itself as the bake goes on.
 class ProgressMeter {
  public:
-  ProgressMeter(BakeObserver& observer, double row_rays, double gather_rays);
+  using Clock = std::chrono::steady_clock;
+
+  /// The bake began at `start`; it is prepared and its rays are known by now.
+  ProgressMeter(BakeObserver& observer, Clock::time_point start, double row_rays, double gather_rays);
 
   /// From any thread. Calls the observer at most about 20 times a second, and at the end of each stage.
   void report(BakeStage stage, std::uint64_t done, std::uint64_t total, double residual = 0);
@@ -21,7 +24,6 @@ class ProgressMeter {
   std::vector<StageTime> stage_times();
 
  private:
-  using Clock = std::chrono::steady_clock;
   void enter(BakeStage stage);
 
   BakeObserver& observer_;
@@ -30,8 +32,8 @@ class ProgressMeter {
   double gather_share_;
   double fraction_ = 0;
   BakeStage stage_ = BakeStage::kPreparing;
-  Clock::time_point start_ = Clock::now();
-  Clock::time_point stage_start_ = start_;
+  Clock::time_point start_;
+  Clock::time_point stage_start_;
   Clock::time_point last_report_{};
   std::vector<StageTime> times_;
 };

@@ -82,6 +82,7 @@ void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::ve
     parts.clear();
     for (const Piece& piece : pieces) split(piece, cuts, parts);
     std::vector<std::uint32_t> sides;
+    sides.reserve(parts.size());
     for (const auto& part : parts) sides.push_back(part.first);
     std::sort(sides.begin(), sides.end());
     sides.erase(std::unique(sides.begin(), sides.end()), sides.end());

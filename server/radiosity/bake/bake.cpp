@@ -44,13 +44,11 @@ struct PatchLight {
   RadiosityProblem problem;
   std::vector<Vec3> glow, direct;
   std::vector<double> direct_variances;
-  double received_without_source = 0;  ///< lumens from the sky
 };
 
-PatchLight patch_light(const std::vector<PatchRow>& rows, std::span<const double> areas, Vec3 sky) {
+PatchLight patch_light(const std::vector<PatchRow>& rows, Vec3 sky) {
   PatchLight light;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const PatchRow& row = rows[i];
+  for (const PatchRow& row : rows) {
     // The sky's part: what of the row escaped sees it.
     const Vec3 from_sky = row.counted > 0 ? sky * (std::numbers::pi * row.escaped / row.counted) : Vec3{};
     const Vec3 direct = row.direct + from_sky;
@@ -59,7 +57,6 @@ PatchLight patch_light(const std::vector<PatchRow>& rows, std::span<const double
     light.glow.push_back(row.glow);
     light.direct.push_back(direct);
     light.direct_variances.push_back(row.direct_variance);
-    light.received_without_source += areas[i] * mean_component(from_sky);
   }
   return light;
 }
@@ -119,7 +116,7 @@ class Bake {
     const SparseOperator transport(collected_rows(prepared_.patches, square_metres, rows));
     report.transport = summary_of(transport.repair());
 
-    const PatchLight light = patch_light(rows, transport.areas(), scene_.sky);
+    const PatchLight light = patch_light(rows, scene_.sky);
     std::vector<Vec3> radiosity = light.problem.source;
     const SolveOptions options;
     const SolveReport solved = solve_gauss_seidel(
@@ -141,7 +138,6 @@ class Bake {
     }
     EnergyTerms terms{radiosity, light.problem.reflectance, light.glow, light.direct, light.direct_variances};
     terms.light_flux = light_flux;
-    terms.received_without_source = light.received_without_source;
     terms.is_closed = report.transport.escape_share == 0 && report.transport.absorbed_share == 0;
     const EnergyBalance balance = audit_energy(transport, terms);
     report.energy = {balance.is_closed,

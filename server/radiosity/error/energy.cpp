@@ -23,11 +23,9 @@ EnergyBalance audit_energy(const TransportOperator& transport, const EnergyTerms
     variance += areas[i] * areas[i] * terms.direct_variances[i];
   }
   if (sent > 0) balance.transported_relative_gap = std::fabs(sent - arrived - leaving) / sent;
-  balance.emitted = glow + terms.light_flux + terms.received_without_source;
+  balance.emitted = glow + (terms.is_closed ? terms.light_flux : direct);
   balance.absorbed = absorbed;
-  if (!terms.is_closed) {
-    balance.escaped = leaving + (terms.light_flux + terms.received_without_source - direct);
-  }
+  balance.escaped = terms.is_closed ? 0 : leaving;
   balance.gap = balance.emitted - balance.absorbed - balance.escaped;
   balance.gap_standard_error = std::sqrt(variance);
   return balance;

@@ -36,8 +36,8 @@ struct EnergyTerms {
 ///   transported: sum A B' = sum A H^indirect + what leaves      to solver tolerance, on a reciprocal operator
 ///   whole:       sum A E  = sum A (1 - rho) H + what leaves     to the standard error of the direct light
 ///
-/// In an open scene the direct light that misses everything is not counted by rays: it is the difference between what
-/// the lights send and what arrives, so there the whole audit checks the transported part alone.
+/// In an open scene nobody counts the direct light that misses everything (and the sky and the sun have no flux of
+/// their own): there the balance starts from the direct light that arrives, and audits the transported part alone.
 EnergyBalance audit_energy(const TransportOperator& transport, const EnergyTerms& terms);
 
 }  // namespace radbake::radiosity

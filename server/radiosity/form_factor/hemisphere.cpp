@@ -85,7 +85,7 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
         row.arrivals.push_back(patch);
       }
     }
-    if (2 * absorbed > k - first) {
+    if (2 * std::size_t{absorbed} > k - first) {
       row.is_buried[s] = 1;
       ++num_buried;
       row.arrivals.resize(arrivals_before);

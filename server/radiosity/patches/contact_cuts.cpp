@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "server/radiosity/patches/grid_polygon.h"
@@ -15,27 +16,48 @@ constexpr std::size_t kMaxCuts = 6;
 /// A contact shorter than this share of a cell, or a part smaller than this share of it, comes from rounding.
 constexpr double kNegligible = 1e-5;
 
-/// Where a triangle meets a plane: 0, 1 or 2 points. Corners within `tolerance` of the plane lie in it.
-std::vector<Vec3> points_in_plane(const std::array<Vec3, 3>& corners, Vec3 on_plane, Vec3 normal, double tolerance) {
+/// A straight piece of one triangle in the plane of another, as that one's barycentric weights.
+struct Contact {
+  Vec2 a, b;
+};
+
+/// Where a triangle meets the plane of another in a segment. Corners within `tolerance` of the plane lie in it; a
+/// triangle that lies in it altogether meets it in no segment.
+std::optional<std::array<Vec3, 2>> segment_in_plane(const std::array<Vec3, 3>& corners, Vec3 on_plane, Vec3 normal,
+                                                    double tolerance) {
   std::array<double, 3> height;
-  int num_in_plane = 0;
+  int above = 0, below = 0;
   for (int k = 0; k < 3; ++k) {
     height[k] = dot(corners[k] - on_plane, normal);
-    if (std::fabs(height[k]) <= tolerance) {
-      height[k] = 0;
-      ++num_in_plane;
-    }
+    if (std::fabs(height[k]) <= tolerance) height[k] = 0;
+    above += height[k] > 0;
+    below += height[k] < 0;
   }
-  std::vector<Vec3> points;
-  if (num_in_plane == 3) return points;
-  for (int k = 0; k < 3; ++k) {
+  // Apart, in one corner only, or in the plane.
+  if (above == 3 || below == 3 || above + below == 0) return {};
+  if (above + below == 2 && (above == 0 || below == 0)) return {};
+  std::array<Vec3, 2> ends;
+  int found = 0;
+  for (int k = 0; k < 3 && found < 2; ++k) {
     const int next = (k + 1) % 3;
-    if (height[k] == 0) points.push_back(corners[k]);
-    if (height[k] * height[next] < 0) {
-      points.push_back(corners[k] + (corners[next] - corners[k]) * (height[k] / (height[k] - height[next])));
+    if (height[k] == 0) ends[found++] = corners[k];
+    if (height[k] * height[next] < 0 && found < 2) {
+      ends[found++] = corners[k] + (corners[next] - corners[k]) * (height[k] / (height[k] - height[next]));
     }
   }
-  return points;
+  if (found < 2) return {};
+  return ends;
+}
+
+/// Cuts a segment to where an affine function is not below -tolerance; false where nothing is left.
+bool cut_to(Contact& segment, double at_a, double at_b, double tolerance) {
+  at_a += tolerance;
+  at_b += tolerance;
+  if (at_a < 0 && at_b < 0) return false;
+  if (at_a >= 0 && at_b >= 0) return true;
+  const Vec2 cut = segment.a + (segment.b - segment.a) * (at_a / (at_a - at_b));
+  (at_a < 0 ? segment.a : segment.b) = cut;
+  return true;
 }
 
 /// Whether the segment from a to b runs through the unit cell at (column, row) by more than a rounding.
@@ -57,7 +79,7 @@ bool runs_through_cell(Vec2 a, Vec2 b, double column, double row) {
 
 }  // namespace
 
-void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<char>& is_double_sided,
+void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<std::uint8_t>& is_double_sided,
                               std::size_t max_new) {
   // Sort the pieces by cell, in order within one.
   const std::size_t num_cells = is_double_sided.size();
@@ -69,7 +91,7 @@ void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::ve
   for (std::size_t i = 0; i < sorted.size(); ++i) sorted[next[cell_of_piece[i]]++] = patches_.pieces_[i];
 
   // Cut each cell, and number its parts in the order of their sides.
-  std::vector<char> is_part_double_sided;
+  std::vector<std::uint8_t> is_part_double_sided;
   std::vector<Cut> cuts;
   std::vector<std::pair<std::uint32_t, Piece>> parts;
   patches_.pieces_.clear();
@@ -143,19 +165,31 @@ void ContactCutter::find_cuts(std::span<const Piece> pieces, std::vector<Cut>& c
 void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, std::vector<Cut>& cuts) const {
   const std::uint32_t t = piece.triangle;
   const auto& c = surfaces_.corners[t];
+  const Vec3 n = surfaces_.normals[t];
   const double tolerance = std::max(surfaces_.ray_offsets[t], surfaces_.ray_offsets[other]);
-  const auto points = points_in_plane(surfaces_.corners[other], c[0], surfaces_.normals[t], tolerance);
-  if (points.size() != 2 || cuts.size() == kMaxCuts) return;
+  const auto segment = segment_in_plane(surfaces_.corners[other], c[0], n, tolerance);
+  if (!segment || cuts.size() == kMaxCuts) return;
 
-  // Into grid coordinates by barycentric weights: u = ((p - c0) x e2).n / |e1 x e2|.
-  const Vec3 e1 = c[1] - c[0], e2 = c[2] - c[0], n = surfaces_.normals[t];
+  // The part of the segment within the triangle, by barycentric weights: u = ((p - c0) x e2).n / |e1 x e2|.
+  const Vec3 e1 = c[1] - c[0], e2 = c[2] - c[0];
   const double twice_area = 2 * surfaces_.areas[t];
+  const auto weights = [&](Vec3 p) {
+    return Vec2{dot(cross(p - c[0], e2), n) / twice_area, dot(cross(e1, p - c[0]), n) / twice_area};
+  };
+  Contact contact{weights((*segment)[0]), weights((*segment)[1])};
+  for (int side = 0; side < 3; ++side) {
+    const auto height = [side](Vec2 p) { return side == 0 ? p.x : side == 1 ? p.y : 1 - p.x - p.y; };
+    const double at_a = height(contact.a), at_b = height(contact.b);
+    if (!cut_to(contact, at_a, at_b, kNegligible)) return;
+    // Along a side of the triangle: another surface's border, unless this surface goes on beyond it.
+    if (std::max(std::fabs(at_a), std::fabs(at_b)) <= kNegligible && !goes_on_beyond(t, side)) return;
+  }
+
   const auto& map = patches_.maps_[t];
   std::array<Vec2, 2> ends;
   for (int k = 0; k < 2; ++k) {
-    const Vec3 d = points[k] - c[0];
-    const Vec3 grid =
-        map.origin + map.per_u * (dot(cross(d, e2), n) / twice_area) + map.per_v * (dot(cross(e1, d), n) / twice_area);
+    const Vec2 w = k == 0 ? contact.a : contact.b;
+    const Vec3 grid = map.origin + map.per_u * w.x + map.per_v * w.y;
     ends[k] = {grid.x, grid.y};
   }
   const Vec2 middle = (piece.corners[0] + piece.corners[1] + piece.corners[2]) * (1.0 / 3);
@@ -175,6 +209,19 @@ void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, std::ve
     }
   }
   cuts.push_back(cut);
+}
+
+bool ContactCutter::goes_on_beyond(std::uint32_t triangle, int side) const {
+  // Side 0 is u = 0, between corners 0 and 2; side 1 is v = 0; side 2 lies opposite corner 0.
+  const auto& c = surfaces_.corners[triangle];
+  const Vec3 a = side == 2 ? c[1] : c[0], b = side == 1 ? c[1] : c[2];
+  const auto has = [](const std::array<Vec3, 3>& corners, Vec3 p) {
+    return corners[0] == p || corners[1] == p || corners[2] == p;
+  };
+  return std::any_of(near_.begin(), near_.end(), [&](std::uint32_t other) {
+    return other != triangle && group_of_[other] == group_of_[triangle] && has(surfaces_.corners[other], a) &&
+           has(surfaces_.corners[other], b);
+  });
 }
 
 void ContactCutter::split(const Piece& piece, std::span<const Cut> cuts,

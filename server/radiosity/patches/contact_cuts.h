@@ -21,7 +21,8 @@ class ContactCutter {
 
   /// Turns cells into parts: cell_of_piece and is_double_sided are by grid cell before, by front patch after.
   /// At most max_new patches are added; cells beyond that stay whole and are counted.
-  void cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<char>& is_double_sided, std::size_t max_new);
+  void cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<std::uint8_t>& is_double_sided,
+                 std::size_t max_new);
 
  private:
   using Cut = Patches::Cut;
@@ -29,6 +30,8 @@ class ContactCutter {
 
   void find_cuts(std::span<const Piece> pieces, std::vector<Cut>& cuts);
   void add_contact(const Piece& piece, std::uint32_t other, std::vector<Cut>& cuts) const;
+  /// Whether the triangle's group has another triangle across this side.
+  bool goes_on_beyond(std::uint32_t triangle, int side) const;
   void split(const Piece& piece, std::span<const Cut> cuts, std::vector<std::pair<std::uint32_t, Piece>>& parts) const;
 
   const Surfaces& surfaces_;

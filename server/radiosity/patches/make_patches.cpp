@@ -96,7 +96,7 @@ class PatchBuilder {
       plane.axes[0] = normalized(in_plane);
       plane.axes[1] = cross(plane.axes[2], plane.axes[0]);
     }
-    std::vector<char> is_started(planes_.size(), 0);
+    std::vector<std::uint8_t> is_started(planes_.size(), 0);
     for (std::uint32_t t = 0; t < surfaces_.size(); ++t) {
       const std::uint32_t g = groups_.group_of[t];
       for (const Vec3 corner : surfaces_.corners[t]) {
@@ -325,10 +325,10 @@ class PatchBuilder {
   std::size_t num_group_sides_ = 0;
   // Of the current attempt:
   Patches result_;
-  std::vector<Vec3> cell_size_;       ///< [grids]
-  std::vector<char> grid_is_merged_;  ///< [grids]
+  std::vector<Vec3> cell_size_;               ///< [grids]
+  std::vector<std::uint8_t> grid_is_merged_;  ///< [grids]
   std::vector<std::uint32_t> cell_of_piece_;
-  std::vector<char> cell_is_double_sided_;
+  std::vector<std::uint8_t> cell_is_double_sided_;
   std::size_t count_ = 0;
 };
 

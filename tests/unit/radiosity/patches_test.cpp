@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 #include <random>
 #include <set>
@@ -124,6 +125,45 @@ TEST(Patches, AreCutWhereAWallStandsOnTheFloor) {
   ASSERT_EQ(right.size(), 1u);
   EXPECT_NE(*left.begin(), *right.begin());
   EXPECT_NEAR(cut.patches.area(*left.begin()) / cut.patches.area(*right.begin()), 1.5 / 2.5, kRounding);
+}
+
+TEST(Patches, AreCutWhereAWallStandsOnASideBetweenTwoTrianglesOfTheFloor) {
+  // The floor's own triangulation runs along the wall: its diagonal.
+  tests::RoomBuilder builder(4);
+  const int grey = builder.add_material("grey", {0.5, 0.5, 0.5}, {1, 1, 1});
+  builder.add_quad("floor", {0, 0, 0}, {0, 0, 4}, {4, 0, 0}, grey);
+  builder.add_quad("wall", {0, 0, 0}, {4, 0, 4}, {0, 2, 0}, grey);
+  const Cut cut(builder.scene(), 4, 64);
+  EXPECT_NE(cut.patches.find(0, 0.3, 0.3, false), cut.patches.find(1, 0.3, 0.3, false));
+}
+
+// A hilly surface is many groups that border on each other; borders are no contacts.
+TEST(Patches, OfAHillySurfaceAreNotCutWhereItsGroupsMeet) {
+  constexpr std::uint32_t kSide = 40;
+  Scene scene;
+  scene.materials.push_back(Material{});
+  scene.materials[0].emissive = {1, 1, 1};
+  Mesh hills;
+  for (std::uint32_t z = 0; z <= kSide; ++z) {
+    for (std::uint32_t x = 0; x <= kSide; ++x) {
+      hills.positions.push_back({0.25 * x, std::sin(0.7 * x) * std::cos(0.9 * z), 0.25 * z});
+    }
+  }
+  for (std::uint32_t z = 0; z < kSide; ++z) {
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      const std::uint32_t i = z * (kSide + 1) + x, below = i + kSide + 1;
+      hills.triangles.push_back({i, below, i + 1});
+      hills.triangles.push_back({i + 1, below, below + 1});
+    }
+  }
+  scene.meshes.push_back(hills);
+  // Room for no cut at all: were borders contacts, cells would be left uncut and counted.
+  const std::size_t num_patches = Cut(scene, 1, 100000).patches.size();
+  EXPECT_LE(num_patches, 3200u);
+  const Cut cut(scene, 1, 4096);
+  EXPECT_EQ(cut.patches.num_uncut(), 0u);
+  EXPECT_EQ(cut.patches.size(), num_patches);
+  for (std::uint32_t i = 0; i < cut.patches.size(); ++i) EXPECT_GT(cut.patches.area(i), 0);
 }
 
 }  // namespace

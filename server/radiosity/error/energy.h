@@ -27,7 +27,6 @@ struct EnergyTerms {
   std::span<const Vec3> direct;              ///< H^direct, sky included
   std::span<const double> direct_variances;  ///< of the mean of the channels
   double light_flux = 0;                     ///< sent by emitters and lamps
-  double received_without_source = 0;        ///< received from sky and sun: their flux has no other measure
   bool is_closed = false;                    ///< no ray escaped or was absorbed by a back
 };
 

@@ -12,6 +12,8 @@ namespace {
 /// Numbers that keep the seeds of one purpose apart from those of another.
 enum Purpose : std::uint64_t { kSitesOfTexel = 11, kRaysOfTexel = 12, kLightOfTexel = 13 };
 
+/// Side of a tile, texels; twice that in a large atlas.
+constexpr int kTileEdge = 32;
 constexpr int kLargeAtlas = 1024;
 
 /// Buffers of one thread.
@@ -74,7 +76,7 @@ Texel gather_texel(const GatherScene& scene, const SobolPoints& site_points, int
 GatheredMap gather_lightmap(const GatherScene& scene, const std::function<void(const GatheredTile&)>& on_tile,
                             std::stop_token stop) {
   const int size = scene.atlas.size();
-  const int edge = size > kLargeAtlas ? 2 * Atlas::kBlock : Atlas::kBlock;
+  const int edge = size > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
   const int tiles = (size + edge - 1) / edge;
   const SobolPoints site_points(scene.rows.num_sites());
 

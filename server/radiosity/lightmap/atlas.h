@@ -31,8 +31,8 @@ struct Footprint {
 /// The lightmap's layout: which triangles lie where, by TEXCOORD_1, row 0 at the top (v = 0).
 class Atlas {
  public:
-  /// Side of the square blocks that triangles are sorted into, texels; tiles of the gather are multiples of it.
-  static constexpr int kBlock = 32;
+  /// Side of the square blocks that triangles are sorted into, texels.
+  static constexpr int kBlock = 8;
 
   /// Errors: kInvalidArgument naming the mesh: no TEXCOORD_1, coordinates outside 0..1, nothing with an area in the
   /// atlas, two triangles on one place (then both meshes).

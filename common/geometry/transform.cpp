@@ -30,7 +30,7 @@ Transform transform_from_trs(Vec3 translation, const std::array<double, 4>& rota
 
 Transform transform_from_matrix(const std::array<double, 16>& m) {
   Transform result;
-  for (int i = 0; i < 3; ++i) result.columns[i] = {m[4 * i], m[4 * i + 1], m[4 * i + 2]};
+  for (std::size_t i = 0; i < 3; ++i) result.columns[i] = {m[4 * i], m[4 * i + 1], m[4 * i + 2]};
   result.translation = {m[12], m[13], m[14]};
   return result;
 }

@@ -6,6 +6,7 @@
 #include "common/base/check.h"
 #include "server/radiosity/patches/contact_cuts.h"
 #include "server/radiosity/patches/grid_polygon.h"
+#include "server/radiosity/patches/group_planes.h"
 #include "server/radiosity/patches/groups.h"
 #include "server/radiosity/patches/patches.h"
 
@@ -22,15 +23,6 @@ constexpr double kWholeSceneEdge = 4;
 /// Which groups smaller than a cell become one patch.
 enum class Merging { kNone, kWithinMaterial, kAcrossMaterials };
 
-/// A group's plane: axes s (along its longest edge), t, and its mean normal; and its extent along them.
-struct Plane {
-  std::array<Vec3, 3> axes;
-  Vec3 low, high;
-  Vec3 centroid;
-  double area = 0;
-  std::uint32_t first_triangle = kNoPatch;
-};
-
 }  // namespace
 
 class PatchBuilder {
@@ -40,8 +32,9 @@ class PatchBuilder {
         visibility_(visibility),
         options_(options),
         groups_(group_surfaces(surfaces)),
+        planes_(group_planes(surfaces, groups_)),
         max_uncut_(options.max_patches - options.max_patches / 4) {
-    find_planes();
+    for (const GroupPlane& plane : planes_) num_group_sides_ += sides(plane.first_triangle);
   }
 
   Patches build() {
@@ -63,81 +56,9 @@ class PatchBuilder {
   }
 
  private:
-  void find_planes() {
-    planes_.resize(groups_.num_groups);
-    std::vector<double> longest(groups_.num_groups, 0);
-    for (std::uint32_t t = 0; t < surfaces_.size(); ++t) {
-      Plane& plane = planes_[groups_.group_of[t]];
-      if (plane.first_triangle == kNoPatch) {
-        plane.first_triangle = t;
-        num_group_sides_ += sides(t);
-      }
-      const auto& c = surfaces_.corners[t];
-      plane.axes[2] += surfaces_.normals[t] * surfaces_.areas[t];
-      plane.centroid += (c[0] + c[1] + c[2]) * (surfaces_.areas[t] / 3);
-      plane.area += surfaces_.areas[t];
-      for (int k = 0; k < 3; ++k) {
-        const Vec3 side = c[(k + 1) % 3] - c[k];
-        const double squared = dot(side, side);
-        // The first of equally long edges: diagonals of a square tie, its sides do not win over them.
-        if (squared > longest[groups_.group_of[t]]) {
-          longest[groups_.group_of[t]] = squared;
-          plane.axes[0] = side;
-        }
-      }
-    }
-    for (Plane& plane : planes_) {
-      plane.centroid = plane.centroid / plane.area;
-      plane.axes[2] = normalized(plane.axes[2]);
-    }
-    choose_straight_edges();
-    for (Plane& plane : planes_) {
-      const Vec3 in_plane = plane.axes[0] - plane.axes[2] * dot(plane.axes[0], plane.axes[2]);
-      plane.axes[0] = normalized(in_plane);
-      plane.axes[1] = cross(plane.axes[2], plane.axes[0]);
-    }
-    std::vector<std::uint8_t> is_started(planes_.size(), 0);
-    for (std::uint32_t t = 0; t < surfaces_.size(); ++t) {
-      const std::uint32_t g = groups_.group_of[t];
-      for (const Vec3 corner : surfaces_.corners[t]) {
-        const Vec3 at = in_plane(planes_[g], corner);
-        if (!is_started[g]) planes_[g].low = planes_[g].high = at;
-        is_started[g] = 1;
-        for (int axis = 0; axis < 3; ++axis) {
-          planes_[g].low[axis] = std::min(planes_[g].low[axis], at[axis]);
-          planes_[g].high[axis] = std::max(planes_[g].high[axis], at[axis]);
-        }
-      }
-    }
-  }
-
-  /// Lays each grid along the longest edge that meets another one of its triangle at a right angle, if there is one:
-  /// the side of a rectangle, not its diagonal.
-  void choose_straight_edges() {
-    constexpr double kRightAngle = 1e-6;
-    std::vector<double> longest(planes_.size(), 0);
-    for (std::uint32_t t = 0; t < surfaces_.size(); ++t) {
-      const std::uint32_t g = groups_.group_of[t];
-      const auto& c = surfaces_.corners[t];
-      for (int k = 0; k < 3; ++k) {
-        const Vec3 a = c[(k + 1) % 3] - c[k], b = c[(k + 2) % 3] - c[k];
-        if (std::fabs(dot(a, b)) > kRightAngle * length(a) * length(b)) continue;
-        const Vec3 side = dot(a, a) >= dot(b, b) ? a : b;
-        if (dot(side, side) > longest[g]) {
-          longest[g] = dot(side, side);
-          planes_[g].axes[0] = side;
-        }
-      }
-    }
-  }
-
-  static Vec3 in_plane(const Plane& plane, Vec3 p) {
-    return {dot(p, plane.axes[0]), dot(p, plane.axes[1]), dot(p, plane.axes[2])};
-  }
-
   int sides(std::uint32_t triangle) const { return surfaces_.material(triangle).is_double_sided ? 2 : 1; }
 
-  bool is_small(const Plane& plane, double edge) const { return max_component(plane.high - plane.low) <= edge; }
+  bool is_small(const GroupPlane& plane, double edge) const { return max_component(plane.high - plane.low) <= edge; }
 
   /// Builds patches of this edge; false where there are more than allowed (count_ then holds at least how many).
   bool try_edge(double edge, Merging merging) {
@@ -163,7 +84,7 @@ class PatchBuilder {
     cell_size_.clear();
     grid_is_merged_.clear();
     for (std::uint32_t g = 0; g < planes_.size(); ++g) {
-      const Plane& plane = planes_[g];
+      const GroupPlane& plane = planes_[g];
       Patches::Grid grid;
       Vec3 cell_size{1, 1, 1};
       const bool can_merge = merging != Merging::kNone && is_small(plane, edge);
@@ -218,11 +139,11 @@ class PatchBuilder {
   void cut_triangle(std::uint32_t t) {
     const std::uint32_t g = result_.group_of_[t];
     const bool is_merged = grid_is_merged_[g];
-    const Plane& plane = planes_[groups_.group_of[t]];
+    const GroupPlane& plane = planes_[groups_.group_of[t]];
     const auto& c = surfaces_.corners[t];
     std::array<Vec3, 3> at;
     for (int k = 0; k < 3; ++k) {
-      const Vec3 q = in_plane(plane, c[k]) - plane.low;
+      const Vec3 q = plane.coordinates(c[k]) - plane.low;
       at[k] = {q.x / cell_size_[g].x, q.y / cell_size_[g].y, q.z / cell_size_[g].z};
       if (is_merged) at[k] = {0.5, 0.5, 0.5};
     }
@@ -320,9 +241,9 @@ class PatchBuilder {
   const Visibility& visibility_;
   PatchOptions options_;
   SurfaceGroups groups_;
-  std::size_t max_uncut_;
-  std::vector<Plane> planes_;  ///< [groups]
-  std::size_t num_group_sides_ = 0;
+  std::vector<GroupPlane> planes_;   ///< [groups]
+  std::size_t max_uncut_;            ///< patches before cells are cut along contacts
+  std::size_t num_group_sides_ = 0;  ///< groups, both sides of sheets counted
   // Of the current attempt:
   Patches result_;
   std::vector<Vec3> cell_size_;               ///< [grids]

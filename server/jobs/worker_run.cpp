@@ -42,7 +42,7 @@ Result<void> WorkerRun::start(WorkerGate& gate) {
 
   std::vector<std::string> arguments = {"--fd",      std::to_string(theirs.get()),       "--job", assignment_.job,
                                         "--attempt", std::to_string(assignment_.attempt)};
-  if (options_.log_json) arguments.push_back("--log-json");
+  if (options_.log_json) arguments.emplace_back("--log-json");
   {
     const std::lock_guard lock(mutex_);
     order_ = std::move(order);

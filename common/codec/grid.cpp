@@ -13,8 +13,9 @@ constexpr int kMaxBits = 24;
 constexpr int kMaxExponent = 100;
 
 struct Bounds {
-  Vec3 lower{INFINITY, INFINITY, INFINITY};
-  Vec3 upper{-INFINITY, -INFINITY, -INFINITY};
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Vec3 lower{kInfinity, kInfinity, kInfinity};
+  Vec3 upper{-kInfinity, -kInfinity, -kInfinity};
 };
 
 /// Bounds of the vertices that triangles use.

@@ -102,6 +102,7 @@ v1::Light to_proto(const Light& light) {
   std::visit(
       [&](const auto& kind) {
         using Kind = std::decay_t<decltype(kind)>;
+        // NOLINTNEXTLINE(bugprone-branch-clone): branches that are not compiled look equal to it
         if constexpr (std::is_same_v<Kind, PointLight>) {
           *out.mutable_point()->mutable_position() = vector_to_proto(kind.position);
           *out.mutable_point()->mutable_intensity() = rgb_to_proto(kind.intensity);

@@ -45,7 +45,8 @@ int add_attribute(draco::Mesh& out, const SentMesh& sent, draco::GeometryAttribu
                   draco::DataType data_type, ValueOf value_of) {
   const auto num_components = static_cast<std::uint8_t>(value_of(sent.vertices[0]).size());
   draco::GeometryAttribute attribute;
-  attribute.Init(type, nullptr, num_components, data_type, false, draco::DataTypeLength(data_type) * num_components, 0);
+  attribute.Init(type, nullptr, num_components, data_type, false,
+                 std::int64_t{draco::DataTypeLength(data_type)} * num_components, 0);
   const int id = out.AddAttribute(attribute, true, static_cast<std::uint32_t>(sent.vertices.size()));
   out.attribute(id)->set_unique_id(unique_id);
   for (std::uint32_t point = 0; point < sent.vertices.size(); ++point) {

@@ -191,10 +191,12 @@ class Parser {
            "Light from a sun: the direction in which it travels (glTF's world, +Y is up) and its illuminance in lx on "
            "a facing surface")
         ->type_name("DX,DY,DZ:R,G,B");
-    sub->add_option("--rays", bake.rays, "Hemisphere rays a texel; a patch's row gets the same; default: the server's, 256")
+    sub->add_option("--rays", bake.rays,
+                    "Hemisphere rays a texel; a patch's row gets the same; default: the server's, 256")
         ->check(check_positive, "")
         ->type_name("N");
-    sub->add_option("--max-patches", bake.max_patches, "Bound on the number of patches, the senders of light; default: the server's, 16384")
+    sub->add_option("--max-patches", bake.max_patches,
+                    "Bound on the number of patches, the senders of light; default: the server's, 16384")
         ->check(check_positive, "")
         ->type_name("N");
     sub->add_option("--max-reflectance", bake.max_reflectance,

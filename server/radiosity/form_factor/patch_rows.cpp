@@ -1,12 +1,11 @@
 #include "server/radiosity/form_factor/patch_rows.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <numeric>
+
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -112,9 +111,9 @@ std::vector<PatchRow> sample_patch_rows(const Surfaces& surfaces, const Patches&
   std::uint64_t total = wave.size();
   std::atomic<std::uint64_t> done = 0;
   while (!wave.empty()) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, wave.size(), kRowsPerTask), [&](const auto& range) {
+    for_each_range(wave.size(), kRowsPerTask, [&](std::size_t begin, std::size_t end) {
       Scratch scratch;
-      for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      for (std::size_t k = begin; k < end; ++k) {
         if (stop.stop_requested()) return;
         sampler.sample(wave[k], scratch, rows[wave[k]]);
         const std::uint64_t now = ++done;

@@ -1,10 +1,10 @@
 #include "server/radiosity/gather/gather.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <mutex>
 #include <numbers>
+
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -91,7 +91,7 @@ GatheredMap gather_lightmap(const GatherScene& scene, const std::function<void(c
   std::mutex report_mutex;
   std::uint64_t texels_done = 0;
 
-  tbb::parallel_for(0, tiles * tiles, [&](int index) {
+  const auto gather_tile = [&](int index) {
     Scratch scratch;
     GatheredTile tile;
     tile.x = index % tiles * edge;
@@ -123,6 +123,9 @@ GatheredMap gather_lightmap(const GatherScene& scene, const std::function<void(c
     texels_done += texels;
     tile.texels_done = texels_done;
     if (on_tile) on_tile(tile);
+  };
+  for_each_range(sums.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t index = begin; index < end; ++index) gather_tile(static_cast<int>(index));
   });
 
   double flux = 0, area = 0;

@@ -1,13 +1,12 @@
 #include "server/radiosity/lightmap/atlas.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <functional>
 #include <set>
 #include <string>
+
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -172,19 +171,19 @@ void Atlas::footprint(int x, int y, Footprint& out) const {
 }
 
 void Atlas::count_texels() {
-  num_texels_ = tbb::parallel_reduce(
-      tbb::blocked_range<int>(0, size_, kBlock), std::uint64_t{0},
-      [this](const tbb::blocked_range<int>& rows, std::uint64_t count) {
-        Footprint footprint;
-        for (int y = rows.begin(); y < rows.end(); ++y) {
-          for (int x = 0; x < size_; ++x) {
-            this->footprint(x, y, footprint);
-            count += !footprint.is_empty();
-          }
-        }
-        return count;
-      },
-      std::plus<>());
+  std::atomic<std::uint64_t> total = 0;
+  for_each_range(static_cast<std::size_t>(size_), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::uint64_t count = 0;
+    Footprint footprint;
+    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+      for (int x = 0; x < size_; ++x) {
+        this->footprint(x, y, footprint);
+        count += !footprint.is_empty();
+      }
+    }
+    total += count;
+  });
+  num_texels_ = total;
 }
 
 Result<void> Atlas::check_overlap() const {

@@ -1,16 +1,15 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "common/base/check.h"
 #include "server/radiosity/solve/solve.h"
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
 
+constexpr std::size_t kRowsPerTask = 256;
 constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
 
 /// The residual of a guess and what follows from it for the error.
@@ -34,8 +33,8 @@ class BoundEstimator {
 
   ErrorBound operator()(const std::vector<Vec3>& radiosity) {
     const auto areas = transport_.areas();
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, terms_.size(), 256), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+    for_each_range(terms_.size(), kRowsPerTask, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
         const auto patch = static_cast<std::uint32_t>(i);
         // r = source + rho F B' - B', and a bound on its own rounding: (n + 4) u times the sum of magnitudes.
         const Vec3 reflected = scaled_by(problem_.reflectance[i], transport_.gather_at(patch, radiosity));

@@ -1,10 +1,9 @@
 #include "server/radiosity/transport/sparse_operator.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -16,8 +15,8 @@ constexpr int kMaxScalingSweeps = 500;
 
 template <typename Body>
 void for_each_row(std::size_t n, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kRowsPerTask), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) body(static_cast<std::uint32_t>(i));
+  for_each_range(n, kRowsPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(static_cast<std::uint32_t>(i));
   });
 }
 

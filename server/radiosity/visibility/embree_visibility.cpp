@@ -51,9 +51,9 @@ class EmbreeVisibility final : public Visibility {
     rtcAttachGeometry(scene_, geometry);
     rtcReleaseGeometry(geometry);
     // Build on one thread: ties between coplanar triangles are decided by the tree's order, and a tree that was built
-    // by several threads may order its leaves by chance.
+    // by several threads may order its leaves by chance. Not rtcJoinCommitScene(): that works in an arena of its own.
     tbb::task_arena one_thread(1);
-    one_thread.execute([this] { rtcJoinCommitScene(scene_); });
+    one_thread.execute([this] { rtcCommitScene(scene_); });
     RADBAKE_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
   }
 

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <random>
 
 namespace radbake::radiosity {
@@ -28,6 +30,19 @@ std::vector<Ray> random_rays(int n, unsigned seed) {
     rays.push_back({{any(random), any(random), any(random)}, {any(random), any(random), any(random)}});
   }
   return rays;
+}
+
+std::ptrdiff_t num_threads() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/task"), std::filesystem::directory_iterator());
+}
+
+// A tree that several threads build may order its leaves by chance, and the order decides ties. As ctest starts each
+// test in a process of its own, no thread is there that a parallel build could use.
+TEST(Visibility, OfEmbreeIsBuiltOnOneThread) {
+  const auto triangles = random_triangles(100000, 8);
+  const std::ptrdiff_t before = num_threads();
+  const auto embree = make_embree_visibility(triangles);
+  EXPECT_EQ(num_threads(), before);
 }
 
 // Single and double precision may disagree on rays that graze an edge: about 1 in 1e5 here.

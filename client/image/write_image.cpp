@@ -2,12 +2,13 @@
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <exception>
-#include <fstream>
 #include <system_error>
 
 #include "client/image/oiio_setup.h"
@@ -34,18 +35,38 @@ Result<void> check_shape(const std::filesystem::path& path, int width, int heigh
                           " with " + std::to_string(channels) + " channels");
 }
 
-// Writes aside and renames, so that nobody sees half a file.
+// Writes all bytes and brings them to the disk. Returns errno, or 0.
+int write_through(const std::filesystem::path& path, const std::vector<unsigned char>& bytes) {
+  const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (fd < 0) return errno;
+  int failure = 0;
+  for (std::size_t done = 0; done < bytes.size() && failure == 0;) {
+    const ssize_t written = write(fd, bytes.data() + done, bytes.size() - done);
+    if (written >= 0) done += std::size_t(written);
+    if (written < 0 && errno != EINTR) failure = errno;
+  }
+  if (failure == 0 && fsync(fd) != 0) failure = errno;
+  if (close(fd) != 0 && failure == 0) failure = errno;
+  return failure;
+}
+
+// Writes aside and renames, so that nobody sees half a file, also after a power loss.
 Result<void> write_file(const std::filesystem::path& path, const std::vector<unsigned char>& bytes) {
   const std::filesystem::path aside = path.string() + "." + std::to_string(getpid()) + ".part";
-  std::ofstream file(aside, std::ios::binary | std::ios::trunc);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(aside, path, error);
-  if (file && !error) return {};
-  const std::string why = error ? error.message() : "the disk is full, or the folder is missing or write-protected";
-  std::filesystem::remove(aside, error);
-  return cannot_write(path, why);
+  std::error_code error(write_through(aside, bytes), std::generic_category());
+  if (!error) std::filesystem::rename(aside, path, error);
+  if (error) {
+    std::error_code ignored;
+    std::filesystem::remove(aside, ignored);
+    return cannot_write(path, error.message());
+  }
+  // The name itself. Not every file system can do that for a folder, and the file is there.
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); fd >= 0) {
+    fsync(fd);
+    close(fd);
+  }
+  return {};
 }
 
 // Encodes in memory, with the format that the path's extension names.

@@ -9,7 +9,8 @@
 namespace radbake::image {
 
 /// Writes float32 EXR with zip compression: scene-linear Rec.709, values in lx (in the metadata).
-/// The bytes depend on the arguments alone. The file appears whole or not at all: written aside and renamed.
+/// The bytes depend on the arguments alone. The file appears whole or not at all, also after a power
+/// loss: written aside, brought to the disk and renamed.
 ///
 /// Shapes: values [height * width * channels], rows from the top; channels 1 to 4: R, G, B, A.
 /// Errors: kInternal if it cannot be written; kInvalidArgument if values have another size.

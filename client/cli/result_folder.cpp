@@ -16,11 +16,15 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Brings a file's or folder's content to the disk, so that a name never outlives a power loss that its bytes did not.
-void flush_to_disk(const fs::path& path) {
+Result<void> flush_to_disk(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return;
-  fsync(fd);
-  close(fd);
+  int failure = fd < 0 || fsync(fd) != 0 ? errno : 0;
+  if (fd >= 0) close(fd);
+  std::error_code ignored;
+  // Some file systems cannot do it for a folder, and some folders may be written to and not read.
+  if ((failure == EINVAL || failure == ENOTSUP || failure == EACCES) && fs::is_directory(path, ignored)) failure = 0;
+  if (failure == 0) return {};
+  return internal_error("cannot bring " + path.string() + " to the disk: " + std::generic_category().message(failure));
 }
 
 Error cannot(const std::string& what, const fs::path& path, const std::error_code& failure) {
@@ -73,28 +77,30 @@ Result<void> ResultFolder::publish() {
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(building_, failure)) {
     names.push_back(entry.path().filename());
-    flush_to_disk(entry.path());
+    RADBAKE_RETURN_IF_ERROR(flush_to_disk(entry.path()));
   }
-  flush_to_disk(building_);
+  if (failure) return internal_error("cannot read " + building_.string() + ": " + failure.message());
+  RADBAKE_RETURN_IF_ERROR(flush_to_disk(building_));
   if (!existed_) {
     fs::rename(building_, folder_, failure);
     if (failure) return internal_error("cannot write " + folder_.string() + ": " + failure.message());
   } else {
-    // The report last.
+    // The report goes first and comes last, on the disk too.
     std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
       return std::pair(a == kReportName, a) < std::pair(b == kReportName, b);
     });
     fs::remove(folder_ / kReportName, failure);
+    RADBAKE_RETURN_IF_ERROR(flush_to_disk(folder_));
     for (const std::string& name : names) {
+      if (name == kReportName) RADBAKE_RETURN_IF_ERROR(flush_to_disk(folder_));
       fs::rename(building_ / name, folder_ / name, failure);
       if (failure) return internal_error("cannot write " + (folder_ / name).string() + ": " + failure.message());
     }
     fs::remove(building_, failure);
-    flush_to_disk(folder_);
+    RADBAKE_RETURN_IF_ERROR(flush_to_disk(folder_));
   }
-  flush_to_disk(folder_.parent_path());
   building_.clear();
-  return {};
+  return flush_to_disk(folder_.parent_path());
 }
 
 }  // namespace radbake::cli

@@ -12,7 +12,7 @@ namespace radbake::cli {
 ///
 /// A new folder appears by one rename, with all in it. Into a folder that exists the files are renamed one by one:
 /// an old report.json goes first and the new one comes last, so where there is a report.json, it and the files that it
-/// names are of one bake.
+/// names are of one bake, also after a power loss.
 class ResultFolder {
  public:
   /// Errors: kInvalidArgument when the folder is not empty (and `force` is not given), is no folder, or cannot be

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "client/cli/proto_json.h"
-#include "client/image/write_image.h"
+#include "client/image/image_codec.h"
 
 namespace radbake::cli {
 namespace {
@@ -49,6 +49,7 @@ Result<std::vector<float>> download_layer(api::Client& client, const v1::Layer& 
 
 Result<void> write_results(api::Client& client, const v1::Bake& bake, const std::optional<SceneReport>& scene,
                            ResultFolder& folder, Stopwatch& stages, Reporter& reporter, std::stop_token stop) {
+  RADBAKE_ASSIGN_OR_RETURN(const image::ImageCodec* images, image::load_image_codec());
   reporter.stage("downloading", -1);
   std::vector<LayerFiles> layers;
   std::vector<std::vector<float>> values;
@@ -63,9 +64,9 @@ Result<void> write_results(api::Client& client, const v1::Bake& bake, const std:
   for (std::size_t i = 0; i < layers.size(); ++i) {
     const v1::Layer& layer = layers[i].layer;
     const int width = layer.width(), height = layer.height(), channels = layer.channels();
-    RADBAKE_RETURN_IF_ERROR(image::write_exr(folder.building() / layers[i].image, width, height, channels, values[i]));
+    RADBAKE_RETURN_IF_ERROR(images->write_exr(folder.building() / layers[i].image, width, height, channels, values[i]));
     RADBAKE_RETURN_IF_ERROR(
-        image::write_preview_png(folder.building() / layers[i].preview, width, height, channels, values[i]));
+        images->write_preview_png(folder.building() / layers[i].preview, width, height, channels, values[i]));
     names.insert(names.end(), {layers[i].image, layers[i].preview});
   }
   stages.end_stage("write");

@@ -1,20 +1,17 @@
 #include <algorithm>
+#include <future>
+#include <optional>
 
 #include "client/cli/commands.h"
 #include "client/cli/proto_json.h"
 #include "client/cli/results.h"
 #include "client/cli/scene_light.h"
 #include "client/gltf/read_gltf.h"
-#include "client/image/decode_image.h"
+#include "client/image/image_codec.h"
 #include "common/codec/scene_codec.h"
 
 namespace radbake::cli {
 namespace {
-
-/// Without the default argument: the reader takes a function of three.
-Result<TexturePlane> decode_image(std::span<const std::byte> bytes, const std::string& name, bool is_srgb) {
-  return image::decode_image(bytes, name, is_srgb);
-}
 
 Error interrupted() { return {ErrorCode::kCancelled, "cancelled before the bake was submitted"}; }
 
@@ -53,7 +50,17 @@ Result<EncodedScene> prepare(const CommandContext& context, SceneReport& report,
   context.reporter.stage("reading", -1);
   gltf::ReadOptions options;
   options.max_reflectance = line.bake.max_reflectance;
-  RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, gltf::read_gltf(line.scene, decode_image, options));
+  // That the image library cannot be loaded is no fault of the scene, as the reader would say.
+  std::optional<Error> not_loaded;
+  const auto decode_image = [&](std::span<const std::byte> bytes, const std::string& name,
+                                bool is_srgb) -> Result<TexturePlane> {
+    const Result<const image::ImageCodec*> images = image::load_image_codec();
+    if (images.ok()) return (*images)->decode_image(bytes, name, is_srgb, image::kDefaultMaxSide);
+    return not_loaded.emplace(images.error());
+  };
+  Result<gltf::GltfScene> scene = gltf::read_gltf(line.scene, decode_image, options);
+  if (not_loaded) return *not_loaded;
+  RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, std::move(scene));
   add_sky_and_sun(line.bake.sky, line.bake.sun, read.scene);
   for (const Warning& warning : read.warnings) context.reporter.warning(warning);
   RADBAKE_RETURN_IF_ERROR(require_light(read.scene, line.scene.filename().string()));
@@ -121,14 +128,23 @@ ExitCode run_submit(const CommandContext& context) {
   const Result<void> within_limits = check_limits(line.bake, session->client.capabilities().limits());
   if (!within_limits.ok()) return fail(context, within_limits.error(), kUsage);
 
+  // Load the image library aside: it costs 0.3 s of one core, and results are to be written as soon as they are there.
+  auto loading = std::async(std::launch::async, [] { return image::load_image_codec(); });
+
   SceneReport scene;
   Result<EncodedScene> encoded = prepare(context, scene, stages);
   if (!encoded.ok()) return fail(context, encoded.error());
   Result<v1::Bake> bake = upload_and_submit(context, session->client, *encoded, stages);
   if (!bake.ok()) return fail(context, session->explain(bake.error()));
+  const std::string name = bake->name();
+  // Not after the bake: hours of work would be out of reach, on a private server for ever.
+  if (const Result<const image::ImageCodec*> images = loading.get(); !images.ok()) {
+    Error error = images.error();
+    if (!line.server.empty()) error.message += "; " + name + " goes on: see radbake download " + name;
+    return fail(context, error);
+  }
   encoded->blobs.clear();  // what the server has needs no place here for the hours of a bake
 
-  const std::string name = bake->name();
   bake = follow(context, session->client, name);
   if (!bake.ok()) {
     Error error = session->explain(bake.error());

@@ -141,6 +141,26 @@ class PrivateServer(CliTest):
         self.assert_exit(result, 4)
         self.assertIn("no radbaked beside", result.stderr)
 
+    def test_without_the_image_library_only_images_fail_and_it_is_named(self):
+        alone = self.place / "alone"
+        alone.mkdir()
+        for program in ("radbake", "radbaked", "radbake-worker"):
+            shutil.copy2(BIN / program, alone)
+        run = lambda *arguments: subprocess.run([alone / "radbake", *map(str, arguments)], env=self.env,
+                                                capture_output=True, text=True, timeout=LIMIT_SECONDS)
+        self.assert_exit(run("capabilities"), 0)
+        result = run("submit", CORNELL, "-o", self.place / "out", *QUICK)
+        self.assert_exit(result, 5)
+        self.assertIn(f"no libradbake_image.so in {alone}", result.stderr)
+        # Not the scene's fault either when a texture asks for it.
+        textured = run("submit", SCENES / "tile-game-room6.glb", "-o", self.place / "out", "--sky", "1,1,1", *QUICK)
+        self.assert_exit(textured, 5)
+        self.assertIn("libradbake_image.so", textured.stderr)
+        self.assert_nothing_left("alone")
+        # Beside the programs is as good as in ../lib.
+        shutil.copy2(BIN.parent / "lib" / "libradbake_image.so", alone)
+        self.assert_exit(run("submit", CORNELL, "-o", self.place / "out", *QUICK), 0)
+
     def test_json_answers_are_one_object(self):
         capabilities = self.run_cli("capabilities", "--json")
         self.assert_exit(capabilities, 0)

@@ -1,8 +1,10 @@
 #include "client/api/client.h"
 
+#include <grpc/grpc.h>
 #include <sys/random.h>
 
 #include <array>
+#include <mutex>
 #include <utility>
 
 #include "client/api/connection.h"
@@ -28,6 +30,13 @@ std::string target_of(const std::string& address) {
   const std::size_t colon = address.find(':', bracket == std::string::npos ? 0 : bracket);
   if (colon != std::string::npos) return address;
   return address + ":" + kDefaultPort;
+}
+
+/// Keeps gRPC up until the process ends: never paid back. Else, when the last gRPC object goes, the library stops its
+/// threads, and one that polls for a socket's writes may be waited for as long as 10 s.
+void keep_grpc_up() {
+  static std::once_flag done;
+  std::call_once(done, grpc_init);
 }
 
 }  // namespace
@@ -58,6 +67,7 @@ Client& Client::operator=(Client&&) noexcept = default;
 const v1::Capabilities& Client::capabilities() const { return connection_->capabilities; }
 
 Result<Client> Client::connect(const std::string& address, const ClientOptions& options, std::stop_token stop) {
+  keep_grpc_up();
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, static_cast<int>(options.first_delay.count()));
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, static_cast<int>(options.first_delay.count()));

@@ -1,5 +1,6 @@
 #include "server/worker/run_worker.h"
 
+#include <grpc/grpc.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -175,6 +176,9 @@ Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& 
 }  // namespace
 
 int run_worker(const std::shared_ptr<grpc::Channel>& channel, const WorkerIdentity& identity) {
+  // Never paid back: when the last gRPC object goes, the library stops its threads, and one that polls for a socket's
+  // writes may be waited for as long as 10 s.
+  grpc_init();
   v1::WorkerHello hello;
   hello.set_job(identity.job);
   hello.set_attempt(identity.attempt);

@@ -4,6 +4,7 @@
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <grpc/grpc.h>
 #include <grpcpp/create_channel_posix.h>
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
@@ -227,6 +228,7 @@ int main(int argc, char** argv) {
   if (fd < 0 || job.empty() || attempt == 0) return 2;
   if (program == kMuteName) std::this_thread::sleep_for(std::chrono::hours(1));
 
+  grpc_init();  // never paid back: the library's own shutdown may take 10 s
   const auto stub = radbake::v1::Workers::NewStub(grpc::CreateInsecureChannelFromFd("server", fd));
   grpc::ClientContext context;
   const auto stream = stub->Report(&context);

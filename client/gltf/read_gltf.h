@@ -20,8 +20,16 @@ struct ReadOptions {
   double max_reflectance = 0.98;  ///< glTF's default base colour is 1, and 1 does not converge
 };
 
+/// Where a mesh of the scene comes from: indices into the file's lists.
+struct MeshSource {
+  int node = 0;
+  int mesh = 0;
+  int primitive = 0;
+};
+
 struct GltfScene {
   Scene scene;                              ///< in world space: instances, transforms and mirrors are applied
+  std::vector<MeshSource> sources;          ///< [scene.meshes]
   std::vector<Warning> warnings;            ///< what was limited, dropped or not simulated, with its share of the area
   std::uint64_t num_triangles_dropped = 0;  ///< of zero area
 };

@@ -50,7 +50,9 @@ struct Material {
 /// Triangles of one material. Front is where the vertices turn counter-clockwise.
 /// Shapes: positions [n]; normals, texcoord0, texcoord1 [n] or empty; triangles [m] of indices below n.
 struct Mesh {
-  std::string name;  ///< for messages: node/mesh#primitive
+  std::string name;          ///< for messages: node/mesh#primitive
+  int object = 0;            ///< meshes of one object share one layout of texcoord1, and lie in one lightmap
+  double texel_density = 1;  ///< factor on the bake's texels per metre
   int material = 0;
   std::vector<Vec3> positions;  ///< metres
   std::vector<Vec3> normals;    ///< unit length

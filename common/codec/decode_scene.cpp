@@ -72,6 +72,15 @@ Result<void> check_texcoords(const Mesh& mesh, const Material& material) {
   return {};
 }
 
+/// The factor on the texels per metre; absent: 1.
+Result<double> read_texel_density(const v1::MeshRecord& record) {
+  const double density = record.texel_density();
+  if (density == 0) return 1.0;
+  if (density >= kMinTexelDensity && density <= kMaxTexelDensity) return density;
+  return invalid_argument("mesh '" + record.name() + "' has a texel density of " + std::to_string(density) +
+                          ", outside " + std::to_string(kMinTexelDensity) + " to " + std::to_string(kMaxTexelDensity));
+}
+
 Result<Scene> decode(const v1::SceneManifest& manifest, const BlobReader& read_blob, const v1::Limits& limits) {
   RADBAKE_RETURN_IF_ERROR(check_counts(manifest, limits));
   Scene scene;
@@ -96,6 +105,8 @@ Result<Scene> decode(const v1::SceneManifest& manifest, const BlobReader& read_b
                              read_declared(record.blob(), "mesh '" + record.name() + "'", read_blob, limits));
     RADBAKE_ASSIGN_OR_RETURN(Mesh mesh, decode_mesh(blob, record, origin));
     RADBAKE_RETURN_IF_ERROR(check_texcoords(mesh, scene.materials[mesh.material]));
+    mesh.object = static_cast<int>(record.object() & 0x7fffffffu);
+    RADBAKE_ASSIGN_OR_RETURN(mesh.texel_density, read_texel_density(record));
     scene.meshes.push_back(std::move(mesh));
   }
   return scene;

@@ -20,6 +20,7 @@ constexpr double kFlatNormalTolerance = 1e-3;
 Result<void> check_mesh(const Scene& scene, const Mesh& mesh) {
   const std::string owner = "mesh '" + mesh.name + "' ";
   const std::size_t num_vertices = mesh.positions.size();
+  if (mesh.object < 0) return invalid_argument(owner + "has object " + std::to_string(mesh.object));
   if (mesh.material < 0 || static_cast<std::size_t>(mesh.material) >= scene.materials.size()) {
     return invalid_argument(owner + "has material " + std::to_string(mesh.material) + " of " +
                             std::to_string(scene.materials.size()));
@@ -159,6 +160,8 @@ Result<v1::MeshRecord> encode_and_verify(const Scene& scene, const Mesh& origina
   record.set_has_normals(layout.has_normals);
   record.set_has_texcoord0(layout.texcoord0.has_value());
   record.set_has_texcoord1(layout.texcoord1.has_value());
+  record.set_object(static_cast<std::uint32_t>(mesh.object));
+  record.set_texel_density(mesh.texel_density);
 
   // Encode, and measure on what comes back.
   RADBAKE_ASSIGN_OR_RETURN(std::string blob, encode_mesh(mesh, layout));
@@ -198,9 +201,11 @@ Result<EncodedScene> encode_scene(const Scene& scene, const EncodeOptions& optio
   Blobs blobs;
   v1::SceneManifest manifest;
   *manifest.mutable_origin() = vector_to_proto(positions.origin);
-  for (const Mesh& mesh : scene.meshes) {
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     // A mesh whose triangles all use a vertex twice has nothing to bake.
+    const Mesh& mesh = scene.meshes[i];
     if (canonical_triangles(mesh.triangles).empty()) continue;
+    encoded.scene_meshes.push_back(static_cast<int>(i));
     RADBAKE_ASSIGN_OR_RETURN(*manifest.add_meshes(),
                              encode_and_verify(scene, mesh, positions, options.atlas_size, blobs, encoded.transfer));
   }

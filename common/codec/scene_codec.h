@@ -25,6 +25,7 @@ struct EncodedBlob {
 struct EncodedScene {
   Digest manifest;
   std::vector<EncodedBlob> blobs;  ///< unique digests: meshes, textures, the manifest last
+  std::vector<int> scene_meshes;   ///< [manifest.meshes] index into Scene::meshes
   v1::MeshTransfer transfer;       ///< what quantisation did, measured by decoding again
 };
 

@@ -47,6 +47,9 @@ struct Material {
   double alpha_cutoff = 0.5;
 };
 
+/// Bounds of Mesh::texel_density.
+inline constexpr double kMinTexelDensity = 1.0 / 64, kMaxTexelDensity = 64;
+
 /// Triangles of one material. Front is where the vertices turn counter-clockwise.
 /// Shapes: positions [n]; normals, texcoord0, texcoord1 [n] or empty; triangles [m] of indices below n.
 struct Mesh {

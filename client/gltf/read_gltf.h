@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,9 +29,20 @@ struct MeshSource {
   int primitive = 0;
 };
 
+/// A vertex of the file that no triangle with an area uses.
+inline constexpr std::uint32_t kNoVertex = std::numeric_limits<std::uint32_t>::max();
+
+/// Vertices of a scene mesh are not those of its primitive: vertices that are equal in all that is read (POSITION,
+/// NORMAL, TEXCOORD_0, TEXCOORD_1, COLOR_0, bit for bit) are one, numbered in the order in which the triangles first
+/// use them. So a scene is the same however a file spells it: strip, list, without indices, sparse.
+/// Triangles keep the file's order; those of zero area are left out.
 struct GltfScene {
-  Scene scene;                              ///< in world space: instances, transforms and mirrors are applied
-  std::vector<MeshSource> sources;          ///< [scene.meshes]
+  Scene scene;                      ///< in world space: instances, transforms and mirrors are applied
+  std::vector<MeshSource> sources;  ///< [scene.meshes]
+  /// [scene.meshes][vertices of the primitive in the file]: the vertex of the scene mesh, or kNoVertex. A vertex of
+  /// the scene may stand for several of the file, which may differ in what is not read (joints, tangents).
+  /// Of a primitive compressed by Draco, the file's vertices are the points that Draco's decoder gives, in its order.
+  std::vector<std::vector<std::uint32_t>> scene_vertex;
   std::vector<Warning> warnings;            ///< what was limited, dropped or not simulated, with its share of the area
   std::uint64_t num_triangles_dropped = 0;  ///< of zero area
 };

@@ -14,8 +14,8 @@ namespace {
 
 using Type = draco::GeometryAttribute;
 
-// One for each attribute beside the position: vertex id, normal, two texture coordinates.
-constexpr unsigned kMaxConnectivities = 4;
+// One for each attribute beside the position: vertex id, normal, two texture coordinates, colour.
+constexpr unsigned kMaxConnectivities = 5;
 
 std::string in_words(std::uint64_t found, const char* what, std::uint64_t declared) {
   return "has " + std::to_string(found) + " " + what + ", its record says " + std::to_string(declared);
@@ -99,7 +99,8 @@ Result<Mesh> read(const draco::Mesh& decoded, const v1::MeshRecord& record, Vec3
   if (decoded.num_faces() != record.num_triangles()) {
     return invalid_argument(in_words(decoded.num_faces(), "triangles after decoding", record.num_triangles()));
   }
-  const int num_attributes = 2 + record.has_normals() + record.has_texcoord0() + record.has_texcoord1();
+  const int num_attributes =
+      2 + record.has_normals() + record.has_texcoord0() + record.has_texcoord1() + record.has_colors();
   if (decoded.num_attributes() != num_attributes) {
     return invalid_argument(in_words(decoded.num_attributes(), "attributes", num_attributes));
   }
@@ -113,6 +114,8 @@ Result<Mesh> read(const draco::Mesh& decoded, const v1::MeshRecord& record, Vec3
                                                                  Type::TEX_COORD, 2, "texcoord 0"));
   RADBAKE_ASSIGN_OR_RETURN(const auto texcoord1, float_attribute(decoded, record.has_texcoord1(), kTexcoord1Id,
                                                                  Type::TEX_COORD, 2, "texcoord 1"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto color,
+                           float_attribute(decoded, record.has_colors(), kColorId, Type::COLOR, 3, "colour"));
 
   // Put every point back to its vertex.
   const std::uint32_t num_vertices = record.num_vertices();
@@ -123,6 +126,7 @@ Result<Mesh> read(const draco::Mesh& decoded, const v1::MeshRecord& record, Vec3
   if (normal.attribute) mesh.normals.assign(num_vertices, Vec3{0, 0, 1});
   if (texcoord0.attribute) mesh.texcoord0.resize(num_vertices);
   if (texcoord1.attribute) mesh.texcoord1.resize(num_vertices);
+  if (color.attribute) mesh.colors.assign(num_vertices, Vec3{1, 1, 1});
   std::vector<std::uint32_t> vertex_of(decoded.num_points());
   for (std::uint32_t point = 0; point < decoded.num_points(); ++point) {
     std::uint32_t vertex = 0;
@@ -146,6 +150,13 @@ Result<Mesh> read(const draco::Mesh& decoded, const v1::MeshRecord& record, Vec3
     if (texcoord1.attribute) {
       RADBAKE_ASSIGN_OR_RETURN(const Vec3 t, texcoord1.at(point));
       mesh.texcoord1[vertex] = {t.x, t.y};
+    }
+    if (color.attribute) {
+      RADBAKE_ASSIGN_OR_RETURN(const Vec3 c, color.at(point));
+      if (min_component(c) < 0 || max_component(c) > 1) {
+        return invalid_argument("has a colour outside 0 to 1 at vertex " + std::to_string(vertex));
+      }
+      mesh.colors[vertex] = c;
     }
   }
 

@@ -104,6 +104,12 @@ std::string encode(const Mesh& mesh, const MeshLayout& layout, const SentMesh& s
   };
   add_texcoord(layout.texcoord0, mesh.texcoord0, kTexcoord0Id);
   add_texcoord(layout.texcoord1, mesh.texcoord1, kTexcoord1Id);
+  if (layout.has_colors) {
+    add_attribute(out, sent, Type::COLOR, kColorId, draco::DT_FLOAT32, [&](std::uint32_t v) {
+      const Vec3 c = mesh.colors[v];
+      return std::array{static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z)};
+    });
+  }
 
   // All attributes are by vertex: one connectivity serves them all.
   encoder.SetSpeedOptions(kSpeed, kSpeed);

@@ -25,7 +25,8 @@ Result<void> check_mesh(const Scene& scene, const Mesh& mesh) {
     return invalid_argument(owner + "has material " + std::to_string(mesh.material) + " of " +
                             std::to_string(scene.materials.size()));
   }
-  for (const std::size_t size : {mesh.normals.size(), mesh.texcoord0.size(), mesh.texcoord1.size()}) {
+  for (const std::size_t size :
+       {mesh.normals.size(), mesh.texcoord0.size(), mesh.texcoord1.size(), mesh.colors.size()}) {
     if (size == 0 || size == num_vertices) continue;
     return invalid_argument(owner + "has an attribute of " + std::to_string(size) + " values for " +
                             std::to_string(num_vertices) + " vertices");
@@ -73,20 +74,27 @@ std::vector<Vec3> normals_to_send(const Mesh& mesh) {
   return is_flat ? std::vector<Vec3>{} : normals;
 }
 
-/// Texels along a side of whatever a mesh's texture coordinate looks up, the largest; 0: nothing looks it up.
-int texels_looked_up(const Scene& scene, const Material& material, int texcoord) {
-  int size = 0;
+/// The most by which a transform stretches a move: the larger singular value of its linear part.
+double largest_stretch(const UvTransform& transform) {
+  const double xx = dot(transform.x_axis, transform.x_axis), yy = dot(transform.y_axis, transform.y_axis);
+  return std::sqrt((xx + yy) / 2 + std::hypot((xx - yy) / 2, dot(transform.x_axis, transform.y_axis)));
+}
+
+/// Texels by which a look-up moves when the mesh's coordinate moves by 1, the largest; 0: nothing looks it up.
+double texels_looked_up(const Scene& scene, const Material& material, int texcoord) {
+  double size = 0;
   for (const auto& reference : {material.reflectance_texture, material.emissive_texture}) {
     if (!reference || reference->texcoord != texcoord) continue;
     if (reference->texture < 0 || static_cast<std::size_t>(reference->texture) >= scene.textures.size()) continue;
     const TexturePlane& plane = scene.textures[reference->texture];
-    size = std::max({size, plane.width, plane.height});
+    // At least 1, also where the transform leaves one point: what is looked up has to be sent.
+    size = std::max({size, 1.0, std::max(plane.width, plane.height) * largest_stretch(reference->transform)});
   }
   return size;
 }
 
 /// The grid of one mesh's texture coordinates: moved by at most 1/100 texel.
-Grid choose_uv_grid(const Mesh& mesh, const std::vector<Vec2>& values, int num_texels) {
+Grid choose_uv_grid(const Mesh& mesh, const std::vector<Vec2>& values, double num_texels) {
   double extent = 0;
   for (const auto& triangle : mesh.triangles) {
     for (const std::uint32_t vertex : triangle) {
@@ -101,7 +109,7 @@ struct Moves {
   double position = 0, texcoord0 = 0, texcoord1 = 0;
 };
 
-Moves measure_moves(const Mesh& before, const Mesh& after, int texels0, int texels1) {
+Moves measure_moves(const Mesh& before, const Mesh& after, double texels0, double texels1) {
   Moves moves;
   const auto move_of = [](Vec2 a, Vec2 b) { return std::hypot(a.x - b.x, a.y - b.y); };
   for (const auto& triangle : after.triangles) {
@@ -145,9 +153,10 @@ Result<v1::MeshRecord> encode_and_verify(const Scene& scene, const Mesh& origina
   Mesh mesh = original;
   mesh.normals = normals_to_send(original);
   const Material& material = scene.materials[mesh.material];
-  const int texels0 = texels_looked_up(scene, material, 0);
-  const int texels1 = std::max(atlas_size > 0 ? atlas_size : kAssumedAtlasSize, texels_looked_up(scene, material, 1));
-  MeshLayout layout{positions.origin, positions.grid, !mesh.normals.empty(), {}, {}};
+  const double texels0 = texels_looked_up(scene, material, 0);
+  const double texels1 =
+      std::max<double>(atlas_size > 0 ? atlas_size : kAssumedAtlasSize, texels_looked_up(scene, material, 1));
+  MeshLayout layout{positions.origin, positions.grid, !mesh.normals.empty(), {}, {}, !mesh.colors.empty()};
   if (!mesh.texcoord0.empty() && texels0 > 0) layout.texcoord0 = choose_uv_grid(mesh, mesh.texcoord0, texels0);
   if (!mesh.texcoord1.empty()) layout.texcoord1 = choose_uv_grid(mesh, mesh.texcoord1, texels1);
 
@@ -160,6 +169,7 @@ Result<v1::MeshRecord> encode_and_verify(const Scene& scene, const Mesh& origina
   record.set_has_normals(layout.has_normals);
   record.set_has_texcoord0(layout.texcoord0.has_value());
   record.set_has_texcoord1(layout.texcoord1.has_value());
+  record.set_has_colors(layout.has_colors);
   record.set_object(static_cast<std::uint32_t>(mesh.object));
   record.set_texel_density(mesh.texel_density);
 

@@ -49,6 +49,14 @@ void write_reference(const std::optional<TextureReference>& reference, auto muta
   v1::TextureReference* out = mutable_reference();
   out->set_texture(static_cast<std::uint32_t>(reference->texture));
   out->set_texcoord(static_cast<std::uint32_t>(reference->texcoord));
+  if (reference->transform == UvTransform{}) return;
+  const auto write = [](Vec2 v, v1::Vector2* message) {
+    message->set_x(v.x);
+    message->set_y(v.y);
+  };
+  write(reference->transform.x_axis, out->mutable_transform()->mutable_x_axis());
+  write(reference->transform.y_axis, out->mutable_transform()->mutable_y_axis());
+  write(reference->transform.offset, out->mutable_transform()->mutable_offset());
 }
 
 Result<TextureReference> read_reference(const v1::TextureReference& reference, int num_textures,
@@ -60,7 +68,17 @@ Result<TextureReference> read_reference(const v1::TextureReference& reference, i
   if (reference.texcoord() > 1) {
     return invalid_argument(owner + " uses texcoord " + std::to_string(reference.texcoord()) + ": there are 0 and 1");
   }
-  return TextureReference{static_cast<int>(reference.texture()), static_cast<int>(reference.texcoord())};
+  TextureReference out{static_cast<int>(reference.texture()), static_cast<int>(reference.texcoord())};
+  if (!reference.has_transform()) return out;
+  const v1::UvTransform& transform = reference.transform();
+  out.transform.x_axis = {transform.x_axis().x(), transform.x_axis().y()};
+  out.transform.y_axis = {transform.y_axis().x(), transform.y_axis().y()};
+  out.transform.offset = {transform.offset().x(), transform.offset().y()};
+  if (out.transform.is_within_float()) return out;
+  const auto in_words = [](Vec2 v) { return "(" + describe(v.x) + ", " + describe(v.y) + ")"; };
+  return invalid_argument(owner + " transforms texture coordinates by " + in_words(out.transform.x_axis) + ", " +
+                          in_words(out.transform.y_axis) + " and " + in_words(out.transform.offset) +
+                          ": must be finite in single precision");
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ struct MeshLayout {
   bool has_normals = false;       ///< octahedral, 16 bits: turned by less than 1e-4 rad
   std::optional<Grid> texcoord0;  ///< absent: not sent
   std::optional<Grid> texcoord1;
+  bool has_colors = false;  ///< float32
 };
 
 /// Unique ids of the attributes in a blob.
@@ -28,6 +29,7 @@ inline constexpr std::uint32_t kTexcoord1Id = 1;
 inline constexpr std::uint32_t kPositionId = 2;
 inline constexpr std::uint32_t kNormalId = 3;
 inline constexpr std::uint32_t kVertexId = 4;
+inline constexpr std::uint32_t kColorId = 5;
 
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 

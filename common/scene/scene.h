@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -26,10 +28,27 @@ struct TexturePlane {
   std::vector<float> values;
 };
 
+/// Affine map of texture coordinates: uv -> x_axis u + y_axis v + offset. Numbers as float32 holds them: products with
+/// coordinates and sizes then stay finite in double.
+struct UvTransform {
+  Vec2 x_axis{1, 0};
+  Vec2 y_axis{0, 1};
+  Vec2 offset;
+
+  Vec2 apply(Vec2 uv) const { return x_axis * uv.x + y_axis * uv.y + offset; }
+  bool is_within_float() const {
+    constexpr double kMax = std::numeric_limits<float>::max();
+    const auto is_within = [](Vec2 v) { return std::fabs(v.x) <= kMax && std::fabs(v.y) <= kMax; };
+    return is_within(x_axis) && is_within(y_axis) && is_within(offset);
+  }
+  bool operator==(const UvTransform&) const = default;
+};
+
 /// Which texture multiplies a material's factor, and which of the mesh's texture coordinates it uses.
 struct TextureReference {
-  int texture = 0;   ///< index into Scene::textures
-  int texcoord = 0;  ///< 0 or 1
+  int texture = 0;             ///< index into Scene::textures
+  int texcoord = 0;            ///< 0 or 1
+  UvTransform transform = {};  ///< of the mesh's coordinate, before it is looked up
 };
 
 enum class AlphaMode { kOpaque, kMask, kBlend };
@@ -51,7 +70,7 @@ struct Material {
 inline constexpr double kMinTexelDensity = 1.0 / 64, kMaxTexelDensity = 64;
 
 /// Triangles of one material. Front is where the vertices turn counter-clockwise.
-/// Shapes: positions [n]; normals, texcoord0, texcoord1 [n] or empty; triangles [m] of indices below n.
+/// Shapes: positions [n]; normals, texcoord0, texcoord1, colors [n] or empty; triangles [m] of indices below n.
 struct Mesh {
   std::string name;          ///< for messages: node/mesh#primitive
   int object = 0;            ///< meshes of one object share one layout of texcoord1, and lie in one lightmap
@@ -61,6 +80,7 @@ struct Mesh {
   std::vector<Vec3> normals;    ///< unit length
   std::vector<Vec2> texcoord0;
   std::vector<Vec2> texcoord1;  ///< the lightmap's layout: (0, 0) is the top left corner of the atlas
+  std::vector<Vec3> colors;     ///< multiply the material's reflectance, each channel in [0, 1]
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 

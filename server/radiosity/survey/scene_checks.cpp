@@ -29,7 +29,7 @@ Result<void> check_mesh(const Scene& scene, std::size_t m) {
   const std::size_t n = mesh.positions.size();
   const auto has_wrong_length = [n](std::size_t length) { return length != 0 && length != n; };
   if (has_wrong_length(mesh.normals.size()) || has_wrong_length(mesh.texcoord0.size()) ||
-      has_wrong_length(mesh.texcoord1.size())) {
+      has_wrong_length(mesh.texcoord1.size()) || has_wrong_length(mesh.colors.size())) {
     return invalid_argument(name + ": attributes differ in length from its " + std::to_string(n) + " positions");
   }
   // Vertices that no triangle uses may hold anything.
@@ -48,6 +48,10 @@ Result<void> check_mesh(const Scene& scene, std::size_t m) {
       if ((!mesh.texcoord0.empty() && !is_finite(mesh.texcoord0[vertex])) ||
           (!mesh.texcoord1.empty() && !is_finite(mesh.texcoord1[vertex]))) {
         return invalid_argument(where() + ": a texture coordinate is not finite");
+      }
+      if (!mesh.colors.empty() && !(is_finite(mesh.colors[vertex]) && min_component(mesh.colors[vertex]) >= 0 &&
+                                    max_component(mesh.colors[vertex]) <= 1)) {
+        return invalid_argument(where() + ": colour " + in_words(mesh.colors[vertex]) + " is not within [0, 1]");
       }
     }
   }
@@ -82,6 +86,13 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
     if (reference->texcoord != 0 && reference->texcoord != 1) {
       return invalid_argument(name + ": TEXCOORD_" + std::to_string(reference->texcoord) +
                               " is not supported (0 or 1)");
+    }
+    if (!reference->transform.is_within_float()) {
+      const UvTransform& transform = reference->transform;
+      return invalid_argument(name + ": the transform of its texture coordinates, " +
+                              in_words({transform.x_axis.x, transform.y_axis.x, transform.offset.x}) + " and " +
+                              in_words({transform.x_axis.y, transform.y_axis.y, transform.offset.y}) +
+                              ", is not finite in single precision");
     }
   }
   // The product of factor and texture must reflect less than it gets, everywhere.

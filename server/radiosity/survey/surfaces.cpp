@@ -18,7 +18,8 @@ Vec3 textured(const Surfaces& surfaces, const SurfacePoint& p, Vec3 factor,
   const Mesh& mesh = surfaces.mesh(p.triangle);
   const auto& texcoord = reference->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1;
   const Vec2 uv = interpolated(texcoord, surfaces.vertices(p.triangle), p);
-  return scaled_by(factor, sampled_texture(surfaces.scene->textures[reference->texture], uv));
+  return scaled_by(factor,
+                   sampled_texture(surfaces.scene->textures[reference->texture], reference->transform.apply(uv)));
 }
 
 }  // namespace
@@ -35,7 +36,9 @@ Vec3 Surfaces::shading_normal(const SurfacePoint& p) const {
 
 Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
   const Material& own = material(p.triangle);
-  return textured(*this, p, own.reflectance, own.reflectance_texture);
+  const Vec3 reflectance = textured(*this, p, own.reflectance, own.reflectance_texture);
+  const std::vector<Vec3>& colors = mesh(p.triangle).colors;
+  return colors.empty() ? reflectance : scaled_by(reflectance, interpolated(colors, vertices(p.triangle), p));
 }
 
 Vec3 Surfaces::exitance(const SurfacePoint& p) const {

@@ -51,7 +51,7 @@ class Surfaces {
   }
   /// Interpolated NORMAL, unit length, or the geometric one where the mesh has none or it points away.
   Vec3 shading_normal(const SurfacePoint& p) const;
-  /// Reflectance there: factor times texture, each channel in [0, 1).
+  /// Reflectance there: factor times texture times the vertices' colours, each channel in [0, 1).
   Vec3 reflectance(const SurfacePoint& p) const;
   /// Exitance there: pi times factor times texture, lx.
   Vec3 exitance(const SurfacePoint& p) const;

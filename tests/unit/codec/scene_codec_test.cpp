@@ -237,6 +237,67 @@ TEST(SceneCodec, SendsTextureCoordinatesAsFloat32WhereTheGridDoesNotReach) {
   }
 }
 
+TEST(SceneCodec, KeepsVertexColoursToTheLastBit) {
+  Scene scene = sheet_scene();
+  Mesh& mesh = scene.meshes[0];
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const auto channel = [i](std::size_t period) {
+      return static_cast<float>(i % period) / static_cast<float>(period);
+    };
+    mesh.colors.push_back({channel(3), channel(7), channel(255)});
+  }
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+  const auto decoded = decode_encoded(*encoded);
+  ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+  EXPECT_EQ(decoded->meshes[0].colors, mesh.colors);
+}
+
+TEST(SceneCodec, KeepsTheTransformOfATexturesCoordinates) {
+  Scene scene = sheet_scene();
+  const UvTransform transform{{0.5, 0.25}, {-0.125, 3}, {0.1, -7}};
+  scene.materials[0].emissive_texture->transform = transform;
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+  const auto decoded = decode_encoded(*encoded);
+  ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+  EXPECT_EQ(decoded->materials[0].emissive_texture->transform, transform);
+  EXPECT_EQ(decoded->materials[0].reflectance_texture->transform, UvTransform{});
+}
+
+TEST(SceneCodec, SendsNothingNewForScenesWithoutColoursAndTransforms) {
+  v1::SceneManifest manifest;
+  ASSERT_TRUE(manifest.ParseFromString(encode_scene(sheet_scene(), {})->blobs.back().bytes));
+  EXPECT_FALSE(manifest.meshes(0).has_colors());
+  EXPECT_FALSE(manifest.materials(0).reflectance_texture().has_transform());
+}
+
+TEST(SceneCodec, BoundsTheMoveOfATextureCoordinateAfterItsTransform) {
+  // A texture of 2 x 1 texels, repeated 1000 times one way: the largest singular value is 1000.
+  Scene scene = sheet_scene(7);  // sevenths are on no grid
+  scene.materials[0].reflectance_texture->transform = {{600, 800}, {-0.8, 0.6}, {5, 5}};
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+  const auto decoded = decode_encoded(*encoded);
+  ASSERT_TRUE(decoded.ok());
+  double largest = 0;
+  for (std::size_t i = 0; i < scene.meshes[0].texcoord0.size(); ++i) {
+    const auto& transform = scene.materials[0].reflectance_texture->transform;
+    const Vec2 move = transform.apply(decoded->meshes[0].texcoord0[i]) - transform.apply(scene.meshes[0].texcoord0[i]);
+    largest = std::max(largest, std::hypot(move.x, move.y) * scene.textures[0].width);
+  }
+  EXPECT_LE(largest, kUvMoveTexels);
+  EXPECT_GT(largest, kUvMoveTexels / 100);
+}
+
+TEST(SceneCodec, SendsCoordinatesThatATransformTakesToOnePoint) {
+  Scene scene = sheet_scene();
+  scene.materials[0].reflectance_texture->transform = {{0, 0}, {0, 0}, {0.5, 0.5}};
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+  EXPECT_TRUE(decode_encoded(*encoded).ok());
+}
+
 TEST(SceneCodec, SendsTexcoord0OnlyWhereATextureUsesIt) {
   Scene scene = sheet_scene();
   scene.materials[0].reflectance_texture.reset();

@@ -158,6 +158,27 @@ TEST(UntrustedScene, RefusesATextureCoordinateThatIsNotThere) {
   EXPECT_THAT(message_of(decode_encoded(encoded)), HasSubstr("mesh 'sheet#0' has no texcoord 0"));
 }
 
+TEST(UntrustedScene, RefusesATransformOfCoordinatesThatIsNotFinite) {
+  for (const double value : {std::numeric_limits<double>::quiet_NaN(), 1e300}) {
+    const auto scene = decode_changed([&](v1::SceneManifest& manifest) {
+      auto& transform = *manifest.mutable_materials(0)->mutable_emissive_texture()->mutable_transform();
+      transform.mutable_x_axis()->set_x(1);
+      transform.mutable_offset()->set_y(value);
+    });
+    EXPECT_THAT(message_of(scene), HasSubstr("material 'paint' transforms texture coordinates by (1, 0)"));
+  }
+}
+
+TEST(UntrustedScene, RefusesColoursOutsideZeroToOne) {
+  // The encoder holds what it sends against the decoder.
+  Scene scene = sheet_scene();
+  scene.meshes[0].colors.assign(scene.meshes[0].positions.size(), {1, 1, 1});
+  scene.meshes[0].colors[40] = {0, 0, 1.5};
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_FALSE(encoded.ok());
+  EXPECT_THAT(encoded.error().message, HasSubstr("mesh 'sheet#0' has a colour outside 0 to 1 at vertex 40"));
+}
+
 TEST(UntrustedScene, RefusesPositionsThatAreNotFinite) {
   // float32 positions travel raw: put a NaN over the first coordinate of the blob that equals a known one.
   Scene scene = sheet_scene();

@@ -58,6 +58,19 @@ INSTANTIATE_TEST_SUITE_P(
                   s.materials[0].reflectance_texture = TextureReference{0, 1};
                 },
                 "reflectance times texture reaches (1,"},
+        Refusal{"ColorsTooFew", [](Scene& s) { s.meshes[0].colors.resize(3); }, "attributes differ in length"},
+        Refusal{"ColorAboveOne",
+                [](Scene& s) {
+                  s.meshes[0].colors.assign(4, {1, 1, 1});
+                  s.meshes[0].colors[2] = {0, 1.5, 0};
+                },
+                "vertex 2: colour (0, 1.5, 0)"},
+        Refusal{"UvTransformNotFinite",
+                [](Scene& s) {
+                  s.textures.push_back({"snow", 1, 1, 3, Wrap::kRepeat, Wrap::kRepeat, {1.0f, 1.0f, 1.0f}});
+                  s.materials[0].reflectance_texture = TextureReference{0, 1, {{1, 0}, {0, INFINITY}, {0, 0}}};
+                },
+                "(0, inf, 0), is not finite in single precision"},
         Refusal{"LightDirectionNotUnit",
                 [](Scene& s) {
                   s.lights.push_back({"sun", DirectionalLight{{0, -2, 0}, {1, 1, 1}}});
@@ -100,6 +113,29 @@ TEST(Survey, TellsSmallBrightEmittersFromGlowingSurfaces) {
   EXPECT_EQ(survey_scene(furnace)->survey.num_glowing_triangles, 24u);
   EXPECT_EQ(survey_scene(panel)->survey.num_emitter_triangles, 2u);
   EXPECT_EQ(survey_scene(panel)->survey.num_glowing_triangles, 0u);
+}
+
+TEST(Survey, MultipliesReflectanceByTheVerticesColours) {
+  Scene scene = tests::furnace_room(0.5);
+  scene.meshes[0].colors.assign(scene.meshes[0].positions.size(), {1, 0.5, 0});
+  const std::uint32_t last = scene.meshes[0].triangles[0][2];
+  scene.meshes[0].colors[last] = {0, 0.5, 1};
+  const SurveyedScene surveyed = survey_scene(scene).value();
+  EXPECT_EQ(surveyed.surfaces.reflectance({0, 0, 0}), (Vec3{0.5, 0.25, 0}));
+  EXPECT_EQ(surveyed.surfaces.reflectance({0, 0, 0.5}), (Vec3{0.25, 0.25, 0.25}));
+  EXPECT_EQ(surveyed.surfaces.exitance({0, 0, 0.5}).z, survey_scene(tests::furnace_room(0.5))->surfaces.exitances[0].z);
+}
+
+TEST(Survey, LooksATextureUpThroughItsTransform) {
+  // Two texels side by side, dark and bright; the coordinates of the triangle are all at the dark one.
+  Scene scene = tests::furnace_room(0.5);
+  scene.textures.push_back({"pair", 2, 1, 3, Wrap::kClamp, Wrap::kClamp, {0.25f, 0.25f, 0.25f, 1.0f, 1.0f, 1.0f}});
+  for (Mesh& mesh : scene.meshes) mesh.texcoord0.assign(mesh.positions.size(), {0.25, 0.5});
+  scene.materials[0].reflectance_texture = TextureReference{0, 0};
+  EXPECT_EQ(survey_scene(scene)->surfaces.reflectance({0, 0.25, 0.25}).x, 0.125);
+  // A quarter turn takes (0.25, 0.5) to (0.5, -0.25), the offset then to (0.75, 0.25): the bright one.
+  scene.materials[0].reflectance_texture->transform = {{0, -1}, {1, 0}, {0.25, 0.5}};
+  EXPECT_EQ(survey_scene(scene)->surfaces.reflectance({0, 0.25, 0.25}).x, 0.5);
 }
 
 // Scaling by a power of two and moving by a multiple of the scene's spacing change no coordinate of the surfaces.

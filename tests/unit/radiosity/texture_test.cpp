@@ -24,5 +24,16 @@ TEST(SampledTexture, GoesOnBeyondItsBorderAsItsWrapSays) {
   EXPECT_DOUBLE_EQ(sampled_texture(pair(Wrap::kRepeat), {1e9 + 0.25, 0.5}).x, 1);
 }
 
+// There the period is lost in rounding; what is read must still be a texel.
+TEST(SampledTexture, StaysInsideForCoordinatesOfAnySize) {
+  for (const Wrap wrap : {Wrap::kClamp, Wrap::kRepeat, Wrap::kMirror}) {
+    for (const double coordinate : {1e17, -1e17, 3e38, -3e38, 1e80, -1e80}) {
+      const double red = sampled_texture(pair(wrap), {coordinate, -coordinate}).x;
+      EXPECT_GE(red, 1) << coordinate;
+      EXPECT_LE(red, 3) << coordinate;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

@@ -15,6 +15,9 @@ struct ImageCodec {
   decltype(&image::decode_image) decode_image;
   decltype(&image::write_exr) write_exr;
   decltype(&image::write_preview_png) write_preview_png;
+  decltype(&image::write_hdr) write_hdr;
+  decltype(&image::write_rgbm_png) write_rgbm_png;
+  decltype(&image::encode_linear_png) encode_linear_png;
 };
 
 /// The one symbol of the library: a function that returns its table, which lives as long as the process.

@@ -3,7 +3,9 @@
 #include "common/base/version.h"
 
 extern "C" __attribute__((visibility("default"))) const radbake::image::ImageCodec* radbake_image_codec() {
-  static const radbake::image::ImageCodec codec{radbake::kEngineVersion, &radbake::image::decode_image,
-                                                &radbake::image::write_exr, &radbake::image::write_preview_png};
+  using namespace radbake;
+  static const image::ImageCodec codec{
+      kEngineVersion,    &image::decode_image,   &image::write_exr,        &image::write_preview_png,
+      &image::write_hdr, &image::write_rgbm_png, &image::encode_linear_png};
   return &codec;
 }

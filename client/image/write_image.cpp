@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <exception>
+#include <limits>
 #include <system_error>
 
 #include "client/image/oiio_setup.h"
 #include "client/image/srgb.h"
+#include "common/base/check.h"
 
 namespace radbake::image {
 namespace {
@@ -69,23 +72,34 @@ Result<void> write_file(const std::filesystem::path& path, const std::vector<uns
   return {};
 }
 
-// Encodes in memory, with the format that the path's extension names.
-Result<void> encode(const std::filesystem::path& path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
-                    const void* pixels) {
+// Encodes in memory. `name`: its extension names the format.
+Result<std::vector<unsigned char>> encode_in_memory(const std::string& name, const OIIO::ImageSpec& spec,
+                                                    OIIO::TypeDesc type, const void* pixels) {
   try {
     set_up_oiio();
     std::vector<unsigned char> bytes;
     OIIO::Filesystem::IOVecOutput memory(bytes);
-    const std::string name = path.filename().string();
     const auto output = OIIO::ImageOutput::create(name, &memory);
-    if (!output) return cannot_write(path, OIIO::geterror());
+    if (!output) return internal_error(OIIO::geterror());
     if (!output->open(name, spec) || !output->write_image(type, pixels) || !output->close()) {
-      return cannot_write(path, output->geterror());
+      return internal_error(output->geterror());
     }
-    return write_file(path, bytes);
+    return bytes;
   } catch (const std::exception& error) {
-    return cannot_write(path, error.what());
+    return internal_error(error.what());
   }
+}
+
+// Encodes in memory, with the format that the path's extension names, and writes.
+Result<void> encode(const std::filesystem::path& path, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+                    const void* pixels) {
+  const Result<std::vector<unsigned char>> bytes = encode_in_memory(path.filename().string(), spec, type, pixels);
+  return bytes.ok() ? write_file(path, *bytes) : cannot_write(path, bytes.error().message);
+}
+
+// A number that an image of integers can hold: 0 for what is negative or not finite.
+double shown_value(float value, double highest) {
+  return std::isfinite(value) ? std::clamp(static_cast<double>(value), 0.0, highest) : 0;
 }
 
 double luminance(const float* rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
@@ -136,6 +150,59 @@ Result<void> write_preview_png(const std::filesystem::path& path, int width, int
   }
   const OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT8);
   return encode(path, spec, OIIO::TypeDesc::UINT8, pixels.data());
+}
+
+Result<void> write_hdr(const std::filesystem::path& path, int width, int height, int channels,
+                       std::span<const float> values) {
+  RADBAKE_RETURN_IF_ERROR(check_shape(path, width, height, channels, 3, values.size()));
+  std::vector<float> pixels;
+  pixels.reserve(std::size_t(width) * std::size_t(height) * 3);
+  for (std::size_t at = 0; at < values.size(); at += std::size_t(channels)) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      pixels.push_back(static_cast<float>(shown_value(values[at + c], std::numeric_limits<float>::max())));
+    }
+  }
+  const OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::FLOAT);
+  return encode(path, spec, OIIO::TypeDesc::FLOAT, pixels.data());
+}
+
+Result<void> write_rgbm_png(const std::filesystem::path& path, int width, int height, int channels,
+                            std::span<const float> values, double multiplier) {
+  RADBAKE_CHECK_LT(0.0, multiplier);
+  RADBAKE_RETURN_IF_ERROR(check_shape(path, width, height, channels, 3, values.size()));
+  std::vector<unsigned char> pixels;
+  pixels.reserve(std::size_t(width) * std::size_t(height) * 4);
+  for (std::size_t at = 0; at < values.size(); at += std::size_t(channels)) {
+    double rgb[3];
+    for (std::size_t c = 0; c < 3; ++c) rgb[c] = shown_value(values[at + c], multiplier) / multiplier;
+    // Not below 1: a texel without M has no colour, and neighbours are filtered with it.
+    const double m = std::max(1.0, std::ceil(255 * std::max({rgb[0], rgb[1], rgb[2]})));
+    for (const double value : rgb) {
+      pixels.push_back(static_cast<unsigned char>(std::min(255L, std::lround(255 * 255 * value / m))));
+    }
+    pixels.push_back(static_cast<unsigned char>(m));
+  }
+  OIIO::ImageSpec spec(width, height, 4, OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:UnassociatedAlpha", 1);  // else colours are divided by what is no opacity
+  return encode(path, spec, OIIO::TypeDesc::UINT8, pixels.data());
+}
+
+Result<std::string> encode_linear_png(int width, int height, int channels, std::span<const float> values,
+                                      double intensity) {
+  RADBAKE_CHECK_LT(0.0, intensity);
+  RADBAKE_RETURN_IF_ERROR(check_shape("a lightmap as PNG", width, height, channels, 3, values.size()));
+  std::vector<std::uint16_t> pixels;
+  pixels.reserve(std::size_t(width) * std::size_t(height) * 3);
+  for (std::size_t at = 0; at < values.size(); at += std::size_t(channels)) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      pixels.push_back(
+          static_cast<std::uint16_t>(std::lround(65535 * (shown_value(values[at + c], intensity) / intensity))));
+    }
+  }
+  const OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT16);
+  const auto bytes = encode_in_memory("lightmap.png", spec, OIIO::TypeDesc::UINT16, pixels.data());
+  if (!bytes.ok()) return internal_error("cannot encode a lightmap as PNG: " + bytes.error().message);
+  return std::string(bytes->begin(), bytes->end());
 }
 
 Result<Pixels> read_exr(const std::filesystem::path& path) {

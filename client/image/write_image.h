@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -27,6 +28,31 @@ Result<void> write_exr(const std::filesystem::path& path, int width, int height,
 /// Source: Reinhard et al. 2002, eq. 4, with L_white = 4.
 Result<void> write_preview_png(const std::filesystem::path& path, int width, int height, int channels,
                                std::span<const float> values);
+
+/// Writes the first three channels as Radiance HDR (RGBE): 8 bits a channel and a shared exponent, within 1 % of each
+/// texel's brightest channel. Linear Rec.709, lx. Values that are negative or not finite become 0.
+///
+/// Shapes: as write_exr, channels 3 or 4. Errors: as write_exr.
+/// Source: Ward 1991, "Real pixels".
+Result<void> write_hdr(const std::filesystem::path& path, int width, int height, int channels,
+                       std::span<const float> values);
+
+/// Writes the first three channels as RGBM in a PNG of 8 bits a channel, linear:
+///
+///   lx = (R, G, B) / 255 * A / 255 * multiplier
+///
+/// A is the smallest that holds the brightest channel, so colours keep 8 bits down to 1/255 of the multiplier.
+/// Values above the multiplier become it; those that are negative or not finite become 0.
+/// Shapes: as write_exr, channels 3 or 4. Errors: as write_exr. Precondition: multiplier > 0.
+Result<void> write_rgbm_png(const std::filesystem::path& path, int width, int height, int channels,
+                            std::span<const float> values, double multiplier);
+
+/// The first three channels over `intensity`, as a PNG of 16 bits a channel in memory: linear, and without a chunk that
+/// would make a reader convert it. Values above the intensity become it; those that are negative or not finite, 0.
+///
+/// Shapes: as write_exr, channels 3 or 4. Errors: as write_exr. Precondition: intensity > 0.
+Result<std::string> encode_linear_png(int width, int height, int channels, std::span<const float> values,
+                                      double intensity);
 
 /// Pixels of an image file. Shapes: values [height * width * channels], rows from the top.
 struct Pixels {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <fstream>
 #include <limits>
 #include <regex>
@@ -31,7 +32,9 @@ class WriteImage : public ::testing::Test {
     return text.str();
   }
   std::vector<std::uint8_t> png_pixels(const char* name, int channels) const {
-    const auto input = OIIO::ImageInput::open(file(name).string());
+    OIIO::ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1);  // else colours come multiplied by A
+    const auto input = OIIO::ImageInput::open(file(name).string(), &config);
     EXPECT_EQ(input->spec().nchannels, channels);
     std::vector<std::uint8_t> pixels(std::size_t(input->spec().width) * std::size_t(input->spec().height) *
                                      std::size_t(channels));
@@ -132,6 +135,64 @@ TEST_F(WriteImage, PreviewShowsDarknessAndNonsenseAsBlack) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   ASSERT_TRUE(write_preview_png(file("dark.png"), 2, 1, 4, std::vector<float>{0, 0, 0, 1, nan, nan, nan, 1}).ok());
   EXPECT_EQ(png_pixels("dark.png", 3), std::vector<std::uint8_t>(6, 0));
+}
+
+TEST_F(WriteImage, HdrKeepsEachTexelWithinTheStepOfItsSharedExponent) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> values = {1, 0.5f, 0.25f, 1, 12345, 1, 0, 0, 1e-3f, 2e-3f, 3e-3f, 1, nan, -4, 7, 1};
+  ASSERT_TRUE(write_hdr(file("map.hdr"), 4, 1, 4, values).ok());
+  EXPECT_THAT(bytes_of("map.hdr"), ::testing::StartsWith("#?RADIANCE"));
+  const auto read = read_exr(file("map.hdr"));  // any format that OpenImageIO reads
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->channels, 3);
+  // 8 bits of mantissa for the brightest channel, which lies in the upper half of their range.
+  constexpr float kStep = 1.0f / 128;
+  const std::vector<float> expected = {1, 0.5f, 0.25f, 12345, 1, 0, 1e-3f, 2e-3f, 3e-3f, 0, 0, 7};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const std::size_t texel = i / 3 * 3;
+    const float brightest = std::max({expected[texel], expected[texel + 1], expected[texel + 2]});
+    EXPECT_NEAR(read->values[i], expected[i], kStep * brightest) << i;
+  }
+}
+
+TEST_F(WriteImage, RgbmGivesBackTheLightWithinItsStep) {
+  constexpr double kMultiplier = 400;
+  const std::vector<float> values = {400, 200, 100, 0, 0, 0, 1, 2, 3, 500, -1, 40};
+  ASSERT_TRUE(write_rgbm_png(file("map.png"), 4, 1, 3, values, kMultiplier).ok());
+  const std::vector<std::uint8_t> pixels = png_pixels("map.png", 4);
+  const std::vector<double> expected = {400, 200, 100, 0, 0, 0, 1, 2, 3, 400, 0, 40};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const double m = pixels[i / 3 * 4 + 3] / 255.0;
+    const double shown = pixels[i / 3 * 4 + i % 3] / 255.0 * m * kMultiplier;
+    EXPECT_NEAR(shown, expected[i], 0.5 / 255 * m * kMultiplier * (1 + 1e-12)) << i;  // half a step of 8 bits
+  }
+  // A black texel keeps an M, and colours are stored as they are, not divided by it.
+  EXPECT_EQ(pixels[7], 1);
+  EXPECT_EQ(pixels[0], 255);
+  EXPECT_EQ(pixels[3], 255);
+}
+
+TEST_F(WriteImage, LinearPngHoldsSharesOfTheIntensityIn16Bits) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> values = {100, 50, 25, 1, 0, nan, 1e9f, 1, -5, 0.1f, 0.001f, 1};
+  const auto png = encode_linear_png(3, 1, 4, values, 100);
+  ASSERT_TRUE(png.ok()) << png.error().message;
+  std::ofstream(file("map.png"), std::ios::binary) << *png;
+  const auto input = OIIO::ImageInput::open(file("map.png").string());
+  ASSERT_EQ(input->spec().format, OIIO::TypeDesc::UINT16);
+  std::vector<std::uint16_t> pixels(9);
+  ASSERT_TRUE(input->read_image(0, 0, 0, 3, OIIO::TypeDesc::UINT16, pixels.data()));
+  EXPECT_THAT(pixels, ::testing::ElementsAre(65535, 32768, 16384, 0, 0, 65535, 0, 66, 1));
+  // No chunk that makes a browser change the numbers, and no date.
+  for (const char* chunk : {"gAMA", "sRGB", "iCCP", "cHRM", "tIME"}) EXPECT_THAT(*png, Not(HasSubstr(chunk)));
+  EXPECT_EQ(*encode_linear_png(3, 1, 4, values, 100), *png);
+}
+
+TEST_F(WriteImage, EveryWriterRefusesValuesOfAnotherShape) {
+  const std::vector<float> values(12);
+  EXPECT_FALSE(write_hdr(file("map.hdr"), 3, 2, 4, values).ok());
+  EXPECT_FALSE(write_rgbm_png(file("map.png"), 3, 1, 2, values, 1).ok());
+  EXPECT_FALSE(encode_linear_png(3, 1, 2, values, 1).ok());
 }
 
 }  // namespace

@@ -23,6 +23,8 @@ struct BakedMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::array<float, 2>> uvs;         ///< final TEXCOORD_1
   std::vector<std::array<float, 3>> irradiance;  ///< lx
+
+  bool operator==(const BakedMesh&) const = default;
 };
 
 /// A lightmap as it is attached: an image of irradiance / intensity, linear (loaders of MOZ_lightmap do not convert).

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "client/gltf/check_document.h"
 
@@ -12,6 +13,22 @@ constexpr double kHalfPi = 1.5707963267948966;
 // Largest emissiveStrength and intensity: above the sun's surface (1.6e9 nit), and within tinygltf's int, to which it
 // cuts whole numbers in extensions.
 constexpr double kMaxStrength = 2e9;
+
+// Coordinates are float32; so is what they are multiplied by.
+constexpr double kMaxUv = std::numeric_limits<float>::max();
+
+// Of a texture that is read.
+Result<void> check_texture_transform(const Entry& owner, const char* key) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> info, owner.member(key));
+  if (!info) return {};
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> transform, info->extension("KHR_texture_transform"));
+  if (!transform) return {};
+  RADBAKE_RETURN_IF_ERROR(transform->numbers("offset", 2, -kMaxUv, kMaxUv));
+  RADBAKE_RETURN_IF_ERROR(transform->number("rotation", -kMaxUv, kMaxUv));
+  RADBAKE_RETURN_IF_ERROR(transform->numbers("scale", 2, -kMaxUv, kMaxUv));
+  return transform->whole_number("texCoord").ok() ? Result<void>()
+                                                  : transform->error("texCoord is not a whole number >= 0");
+}
 
 Result<void> check_texture(const Entry& owner, const char* key, std::size_t num_textures) {
   RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> info, owner.member(key));
@@ -40,7 +57,9 @@ Result<void> check_material(const Entry& material, std::size_t num_textures) {
     RADBAKE_RETURN_IF_ERROR(pbr->number("metallicFactor", 0, 1));
     RADBAKE_RETURN_IF_ERROR(check_texture(*pbr, "baseColorTexture", num_textures));
     RADBAKE_RETURN_IF_ERROR(check_texture(*pbr, "metallicRoughnessTexture", num_textures));
+    RADBAKE_RETURN_IF_ERROR(check_texture_transform(*pbr, "baseColorTexture"));
   }
+  RADBAKE_RETURN_IF_ERROR(check_texture_transform(material, "emissiveTexture"));
   RADBAKE_ASSIGN_OR_RETURN(const auto strength, material.extension("KHR_materials_emissive_strength"));
   if (strength) RADBAKE_RETURN_IF_ERROR(strength->number("emissiveStrength", 0, kMaxStrength));
   RADBAKE_ASSIGN_OR_RETURN(const auto transmission, material.extension("KHR_materials_transmission"));

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "client/gltf/check_document.h"
+#include "client/gltf/texel_density.h"
 
 namespace radbake::gltf {
 namespace {
@@ -27,6 +28,7 @@ std::size_t node_on_cycle(const std::vector<std::size_t>& parents) {
 
 Result<void> check_node(const Entry& node, const Entry& root, std::size_t num_lights) {
   RADBAKE_RETURN_IF_ERROR(node.text("name"));
+  RADBAKE_RETURN_IF_ERROR(check_texel_density(node));
   RADBAKE_RETURN_IF_ERROR(node.index("mesh", list_size(root, "meshes"), "meshes"));
   RADBAKE_RETURN_IF_ERROR(node.whole_number("skin"));
   RADBAKE_RETURN_IF_ERROR(node.numbers("matrix", 16));

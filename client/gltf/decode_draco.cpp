@@ -4,9 +4,9 @@
 #include <draco/compression/decode.h>
 
 #include <algorithm>
-#include <array>
 #include <exception>
-#include <optional>
+
+#include "client/gltf/component.h"
 
 namespace radbake::gltf {
 namespace {
@@ -56,57 +56,54 @@ Result<Claim> peek(std::span<const std::byte> bytes) {
   return claim;
 }
 
-// Values of an attribute for all points. Shapes: sink is called once a point with N numbers.
-template <int N, typename Sink>
-Result<void> read_attribute(const draco::Mesh& mesh, const std::string& name, int unique_id, Sink&& sink) {
-  const draco::PointAttribute* attribute = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(unique_id));
-  if (attribute == nullptr) return corrupt("attribute " + std::to_string(unique_id) + " (" + name + ") is not in it");
-  if (attribute->num_components() != N) {
-    return corrupt(name + " has " + std::to_string(attribute->num_components()) + " components, not " +
-                   std::to_string(N));
+// The type of components as glTF numbers it; 0 for one that it does not know.
+int component_type(draco::DataType type) {
+  switch (type) {
+    case draco::DT_INT8: return kInt8;
+    case draco::DT_UINT8: return kUint8;
+    case draco::DT_INT16: return kInt16;
+    case draco::DT_UINT16: return kUint16;
+    case draco::DT_UINT32: return kUint32;
+    case draco::DT_FLOAT32: return kFloat;
+    default: return 0;
   }
-  // Not by ConvertValue: that looks at a flag which corrupt data leaves as neither true nor false.
-  if (attribute->data_type() != draco::DT_FLOAT32) {
-    return invalid_argument("Draco data holds " + name + " as integers; quantised meshes are not read by this version");
-  }
-  for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
-    const draco::AttributeValueIndex value = attribute->mapped_index(point);
-    std::array<float, N> numbers;
-    if (value.value() >= attribute->size() || !attribute->GetValue<float, N>(value, &numbers)) {
-      return corrupt(name + " of vertex " + std::to_string(point.value()) + " has no value");
-    }
-    sink(numbers);
-  }
-  return {};
 }
 
-Result<Mesh> convert(const draco::Mesh& decoded, const std::map<std::string, int>& attributes) {
-  Mesh mesh;
-  const auto id = [&](const char* name) {
-    const auto it = attributes.find(name);
-    return it == attributes.end() ? std::optional<int>() : std::optional(it->second);
-  };
-  const auto into3 = [](std::vector<Vec3>& out) {
-    return [&out](const std::array<float, 3>& v) { out.push_back({v[0], v[1], v[2]}); };
-  };
-  const auto into2 = [](std::vector<Vec2>& out) {
-    return [&out](const std::array<float, 2>& v) { out.push_back({v[0], v[1]}); };
-  };
-  if (!id("POSITION")) return corrupt("no attribute is named POSITION");
-  RADBAKE_RETURN_IF_ERROR(read_attribute<3>(decoded, "POSITION", *id("POSITION"), into3(mesh.positions)));
-  if (const auto normal = id("NORMAL")) {
-    RADBAKE_RETURN_IF_ERROR(read_attribute<3>(decoded, "NORMAL", *normal, into3(mesh.normals)));
+// Values of an attribute for all points.
+Result<std::vector<Numbers>> read_attribute(const draco::Mesh& mesh, const DracoAttribute& wanted) {
+  const std::string name = "attribute " + std::to_string(wanted.unique_id) + " (" + wanted.name + ")";
+  const draco::PointAttribute* attribute = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(wanted.unique_id));
+  if (attribute == nullptr) return corrupt(name + " is not in it");
+  const int type = component_type(attribute->data_type()), num_components = attribute->num_components();
+  const Result<void> is_fit = check_attribute_type(wanted.name, num_components, type, wanted.is_normalized);
+  if (!is_fit.ok()) return corrupt(name + " " + is_fit.error().message);
+  const std::size_t size = component_bytes(type), element = size * static_cast<std::size_t>(num_components);
+  std::vector<Numbers> values(mesh.num_points(), zeros(num_components));
+  for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
+    // Not by ConvertValue: that looks at a flag which corrupt data leaves as neither true nor false.
+    const draco::AttributeValueIndex value = attribute->mapped_index(point);
+    if (value.value() >= attribute->size() ||
+        static_cast<std::size_t>(attribute->GetBytePos(value)) + element > attribute->buffer()->data_size()) {
+      return corrupt(name + " has no value for vertex " + std::to_string(point.value()));
+    }
+    const unsigned char* bytes = attribute->GetAddress(value);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(num_components); ++c) {
+      values[point.value()][c] = component_value(bytes + c * size, type, wanted.is_normalized);
+    }
   }
-  if (const auto uv = id("TEXCOORD_0")) {
-    RADBAKE_RETURN_IF_ERROR(read_attribute<2>(decoded, "TEXCOORD_0", *uv, into2(mesh.texcoord0)));
+  return values;
+}
+
+Result<DecodedPrimitive> convert(const draco::Mesh& decoded, const std::vector<DracoAttribute>& attributes) {
+  DecodedPrimitive result;
+  for (const DracoAttribute& attribute : attributes) {
+    RADBAKE_ASSIGN_OR_RETURN(result.attributes[attribute.name], read_attribute(decoded, attribute));
   }
-  if (const auto uv = id("TEXCOORD_1")) {
-    RADBAKE_RETURN_IF_ERROR(read_attribute<2>(decoded, "TEXCOORD_1", *uv, into2(mesh.texcoord1)));
-  }
-  mesh.triangles.reserve(decoded.num_faces());
+  if (!result.attributes.contains("POSITION")) return corrupt("no attribute is named POSITION");
+  result.triangles.reserve(decoded.num_faces());
   for (draco::FaceIndex face(0); face < decoded.num_faces(); ++face) {
     const draco::Mesh::Face& corners = decoded.face(face);
-    std::array<std::uint32_t, 3>& triangle = mesh.triangles.emplace_back();
+    std::array<std::uint32_t, 3>& triangle = result.triangles.emplace_back();
     for (int i = 0; i < 3; ++i) {
       triangle[i] = corners[i].value();
       if (triangle[i] >= decoded.num_points()) {
@@ -115,20 +112,20 @@ Result<Mesh> convert(const draco::Mesh& decoded, const std::map<std::string, int
       }
     }
   }
-  return mesh;
+  return result;
 }
 
 }  // namespace
 
-Result<Mesh> decode_draco(const DracoPrimitive& primitive) {
+Result<DecodedPrimitive> decode_draco(const DracoPrimitive& primitive) {
   // Hold the header against the accessors.
   RADBAKE_ASSIGN_OR_RETURN(const Claim claim, peek(primitive.bytes));
-  if (claim.num_faces * 3 > primitive.num_indices) {
-    return corrupt("it claims " + std::to_string(claim.num_faces) + " triangles, its indices accessor counts " +
-                   std::to_string(primitive.num_indices) + " indices");
+  if (claim.num_faces > primitive.num_triangles) {
+    return corrupt("it claims " + std::to_string(claim.num_faces) + " triangles, its indices accessor makes " +
+                   std::to_string(primitive.num_triangles));
   }
   // Encoders split vertices where a surface is no manifold, at most one for each corner.
-  if (claim.num_vertices > std::max(primitive.num_vertices, primitive.num_indices)) {
+  if (claim.num_vertices > std::max(primitive.num_vertices, 3 * primitive.num_triangles)) {
     return corrupt("it claims " + std::to_string(claim.num_vertices) + " vertices, its POSITION accessor counts " +
                    std::to_string(primitive.num_vertices));
   }

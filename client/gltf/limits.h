@@ -11,6 +11,7 @@ inline constexpr std::uint64_t kMaxFileBytes = std::uint64_t{1} << 30;  ///< of 
 inline constexpr std::size_t kMaxJsonValues = 10'000'000;               ///< each takes some 100 bytes once parsed
 inline constexpr int kMaxJsonDepth = 64;                                ///< parsers and destructors recurse
 inline constexpr std::uint64_t kMaxCount = 150'000'000;                 ///< elements of an accessor
+inline constexpr std::uint64_t kMaxUnbackedElements = 1'000'000;        ///< of an accessor without a buffer view
 inline constexpr std::uint64_t kMaxSceneTriangles = 50'000'000;         ///< with all instances placed
 inline constexpr std::uint64_t kMaxSceneVertices = 50'000'000;          ///< with all instances placed
 

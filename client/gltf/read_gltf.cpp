@@ -9,18 +9,17 @@
 #include "client/gltf/limits.h"
 #include "client/gltf/load_model.h"
 #include "client/gltf/place_nodes.h"
+#include "client/gltf/primitive_triangles.h"
 #include "client/gltf/read_lights.h"
 #include "client/gltf/read_materials.h"
 #include "client/gltf/read_primitive.h"
 #include "client/gltf/scene_warnings.h"
+#include "client/gltf/texel_density.h"
+#include "client/gltf/vertex_colors.h"
+#include "client/gltf/weld_vertices.h"
 
 namespace radbake::gltf {
 namespace {
-
-Vec3 area_vector(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
-  const Vec3 origin = mesh.positions[triangle[0]];
-  return cross(mesh.positions[triangle[1]] - origin, mesh.positions[triangle[2]] - origin) * 0.5;
-}
 
 // Drops triangles of zero area; returns the area of the rest.
 double drop_degenerate(Mesh& mesh, std::uint64_t& num_dropped) {
@@ -55,6 +54,14 @@ bool replace_unusable_normals(Mesh& mesh) {
   return is_replaced;
 }
 
+// A primitive of the file, ready to be placed.
+struct LocalMesh {
+  WeldedMesh welded;
+  bool has_colors_out_of_range = false;
+  bool has_translucent_colors = false;
+  double limited_share = 0;  // of its area: reflectance above the limit
+};
+
 // Reads one file; messages leave its name to the caller.
 class SceneReader {
  public:
@@ -64,10 +71,12 @@ class SceneReader {
   Result<GltfScene> read(const std::vector<std::string>& ignored_extensions) {
     RADBAKE_ASSIGN_OR_RETURN(const std::vector<PlacedNode> nodes, place_nodes(model_));
     RADBAKE_RETURN_IF_ERROR(check_size(nodes));
-    // Mesh by mesh, so that one is read once and placed many times.
-    std::vector<std::vector<PlacedNode>> instances(model_.meshes.size());
+    // Mesh by mesh, so that one is read once and placed many times. Each placed node with a mesh is an object.
+    std::vector<std::vector<Placement>> instances(model_.meshes.size());
+    int num_objects = 0;
     for (const PlacedNode& placed : nodes) {
-      if (const int mesh = model_.nodes[placed.node].mesh; mesh >= 0) instances[mesh].push_back(placed);
+      const int mesh = model_.nodes[placed.node].mesh;
+      if (mesh >= 0) instances[mesh].push_back({placed, num_objects++});
     }
     for (std::size_t mesh = 0; mesh < instances.size(); ++mesh) {
       for (std::size_t i = 0; i < model_.meshes[mesh].primitives.size() && !instances[mesh].empty(); ++i) {
@@ -79,20 +88,25 @@ class SceneReader {
     result_.scene.materials = std::move(materials_.materials());
     result_.scene.textures = std::move(materials_.textures());
     result_.num_triangles_dropped = counts_.num_triangles_dropped;
-    counts_.area_m2.resize(result_.scene.materials.size(), 0.0);  // the last ones may have lost all their triangles
+    // The last ones may have lost all their triangles.
+    counts_.area_m2.resize(result_.scene.materials.size(), 0.0);
+    counts_.limited_area_m2.resize(result_.scene.materials.size(), 0.0);
     result_.warnings =
         scene_warnings(result_.scene.materials, materials_.facts(), counts_, ignored_extensions, options_);
     return std::move(result_);
   }
 
  private:
+  struct Placement : PlacedNode {
+    int object = 0;
+  };
+
   // Primitives without triangles, or that we do not place, are counted and not read.
   bool is_read(const tinygltf::Primitive& primitive, const tinygltf::Node& node) {
-    const int mode = primitive.mode;
-    if (mode < TINYGLTF_MODE_TRIANGLES) ++counts_.num_points_and_lines;
-    if (mode > TINYGLTF_MODE_TRIANGLES) ++counts_.num_strips_and_fans;
-    if (mode == TINYGLTF_MODE_TRIANGLES && node.skin >= 0) ++counts_.num_skinned;
-    return mode == TINYGLTF_MODE_TRIANGLES && node.skin < 0;
+    const bool has_triangles = primitive.mode >= kModeTriangles;
+    if (!has_triangles) ++counts_.num_points_and_lines;
+    if (has_triangles && node.skin >= 0) ++counts_.num_skinned;
+    return has_triangles && node.skin < 0;
   }
 
   // A small file can place one large mesh a million times.
@@ -120,44 +134,58 @@ class SceneReader {
   }
 
   Result<void> read_instances(std::size_t mesh_index, std::size_t primitive_index,
-                              const std::vector<PlacedNode>& instances) {
+                              const std::vector<Placement>& instances) {
     const tinygltf::Mesh& source = model_.meshes[mesh_index];
     const tinygltf::Primitive& primitive = source.primitives[primitive_index];
-    std::vector<PlacedNode> placed;
-    for (const PlacedNode& instance : instances) {
+    std::vector<Placement> placed;
+    for (const Placement& instance : instances) {
       if (is_read(primitive, model_.nodes[instance.node])) placed.push_back(instance);
     }
     if (placed.empty()) return {};
     const std::string label = numbered("mesh", mesh_index, source.name) + ", " + numbered("primitive", primitive_index);
-    Result<Mesh> local = read_primitive(model_, primitive);
-    if (!local.ok()) return invalid_argument(label + ": " + local.error().message);
-    if (local->triangles.empty()) return {};
-    RADBAKE_ASSIGN_OR_RETURN(local->material, materials_.scene_material(primitive.material));
-    RADBAKE_RETURN_IF_ERROR(check_texcoords(*local, label));
+    RADBAKE_ASSIGN_OR_RETURN(const int texcoord0_set, materials_.texcoord0_set(primitive.material));
+    Result<FilePrimitive> file = read_primitive(model_, primitive, texcoord0_set);
+    if (!file.ok()) return invalid_argument(label + ": " + file.error().message);
+    if (file->mesh.triangles.empty()) return {};
+    drop_white_colors(file->mesh);
+    LocalMesh local{weld_vertices(file->mesh), file->has_colors_out_of_range, file->has_translucent_colors};
+    Mesh& mesh = local.welded.mesh;
+    RADBAKE_ASSIGN_OR_RETURN(mesh.material, materials_.scene_material(primitive.material));
+    RADBAKE_RETURN_IF_ERROR(check_texcoords(mesh, label, texcoord0_set));
+    local.limited_share = limit_colors(mesh, materials_.materials()[mesh.material], materials_.facts()[mesh.material],
+                                       options_.max_reflectance);
     const std::string mesh_name = source.name.empty() ? "mesh" + std::to_string(mesh_index) : printable(source.name);
-    for (const PlacedNode& instance : placed) {
+    for (const Placement& instance : placed) {
       const std::string& node = model_.nodes[instance.node].name;
-      local->name = (node.empty() ? "node" + std::to_string(instance.node) : printable(node)) + "/" + mesh_name + "#" +
-                    std::to_string(primitive_index);
-      RADBAKE_RETURN_IF_ERROR(place(*local, instance, source, primitive));
+      mesh.name = (node.empty() ? "node" + std::to_string(instance.node) : printable(node)) + "/" + mesh_name + "#" +
+                  std::to_string(primitive_index);
+      mesh.object = instance.object;
+      mesh.texel_density = texel_density(model_.nodes[instance.node], source);
+      const std::size_t before = result_.scene.meshes.size();
+      RADBAKE_RETURN_IF_ERROR(place(local, instance, source, primitive));
+      if (result_.scene.meshes.size() == before) continue;
+      result_.sources.push_back({instance.node, static_cast<int>(mesh_index), static_cast<int>(primitive_index)});
+      result_.scene_vertex.push_back(local.welded.scene_vertex);
     }
     return {};
   }
 
   // A texture needs the coordinates that it names.
-  Result<void> check_texcoords(const Mesh& mesh, const std::string& label) {
+  Result<void> check_texcoords(const Mesh& mesh, const std::string& label, int texcoord0_set) {
     const Material& material = materials_.materials()[mesh.material];
     for (const auto& texture : {material.reflectance_texture, material.emissive_texture}) {
       if (!texture || !(texture->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty()) continue;
       return invalid_argument(label + ": its material " + in_quotes(material.name) + " has a texture on TEXCOORD_" +
-                              std::to_string(texture->texcoord) + ", which the primitive lacks");
+                              std::to_string(texture->texcoord == 0 ? texcoord0_set : 1) +
+                              ", which the primitive lacks");
     }
     return {};
   }
 
-  Result<void> place(const Mesh& local, const PlacedNode& instance, const tinygltf::Mesh& source,
+  Result<void> place(const LocalMesh& local, const PlacedNode& instance, const tinygltf::Mesh& source,
                      const tinygltf::Primitive& primitive) {
-    Mesh mesh = placed_in_world(local, instance.to_world);
+    Mesh mesh = placed_in_world(local.welded.mesh, instance.to_world);
+    counts_.num_triangles_dropped += local.welded.num_triangles_dropped;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
       if (is_finite(mesh.positions[i])) continue;
       return invalid_argument(node_name(model_, instance.node) + ": its transform takes vertex " + std::to_string(i) +
@@ -170,10 +198,15 @@ class SceneReader {
                               " infinite");
     }
     counts_.area_m2.resize(materials_.materials().size(), 0.0);
+    counts_.limited_area_m2.resize(materials_.materials().size(), 0.0);
     counts_.area_m2[mesh.material] += area_m2;
+    counts_.limited_area_m2[mesh.material] += area_m2 * local.limited_share;
     counts_.total_area_m2 += area_m2;
     if (replace_unusable_normals(mesh)) counts_.renormaled_area_m2 += area_m2;
-    if (primitive.attributes.contains("COLOR_0")) counts_.vertex_colored_area_m2 += area_m2;
+    if (local.has_colors_out_of_range) counts_.recolored_area_m2 += area_m2;
+    if (local.has_translucent_colors && materials_.materials()[mesh.material].alpha_mode != AlphaMode::kOpaque) {
+      counts_.translucent_color_area_m2 += area_m2;
+    }
     const std::vector<double>& node_weights = model_.nodes[instance.node].weights;
     for (const double weight : node_weights.empty() ? source.weights : node_weights) {
       if (weight == 0 || primitive.targets.empty()) continue;
@@ -189,9 +222,9 @@ class SceneReader {
     if (counts_.num_triangles_dropped > 0) {
       message += "; " + std::to_string(counts_.num_triangles_dropped) + " have zero area after their transforms";
     }
-    const std::uint64_t num_skipped = counts_.num_points_and_lines + counts_.num_strips_and_fans + counts_.num_skinned;
+    const std::uint64_t num_skipped = counts_.num_points_and_lines + counts_.num_skinned;
     if (num_skipped > 0) {
-      message += "; " + std::to_string(num_skipped) + " primitives are skipped (points, lines, strips, fans, skinned)";
+      message += "; " + std::to_string(num_skipped) + " primitives are skipped (points, lines, skinned)";
     }
     return invalid_argument(message);
   }

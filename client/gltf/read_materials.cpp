@@ -30,11 +30,34 @@ AlphaMode alpha_mode_of(const std::string& mode) {
   return mode == "MASK" ? AlphaMode::kMask : mode == "BLEND" ? AlphaMode::kBlend : AlphaMode::kOpaque;
 }
 
-Result<TextureReference> reference(const char* key, int texcoord) {
-  if (texcoord < 0 || texcoord > 1) {
-    return invalid_argument(std::string(key) + ": texCoord is " + std::to_string(texcoord) + "; only 0 and 1 are read");
-  }
-  return TextureReference{0, texcoord};
+// KHR_texture_transform may name other coordinates than the texture does.
+int texcoord_set(const tinygltf::TextureInfo& info) {
+  const tinygltf::Value* transform = extension(info.extensions, "KHR_texture_transform");
+  return transform != nullptr && transform->Has("texCoord") ? transform->Get("texCoord").GetNumberAsInt()
+                                                            : info.texCoord;
+}
+
+Vec2 pair(const tinygltf::Value* object, const char* key, Vec2 otherwise) {
+  if (object == nullptr || !object->Has(key)) return otherwise;
+  const tinygltf::Value& numbers = object->Get(key);
+  return {numbers.Get(0).GetNumberAsDouble(), numbers.Get(1).GetNumberAsDouble()};
+}
+
+// uv' = T R S uv. The image's y points down: a positive angle turns the coordinates counter-clockwise as they are seen
+// on the image, so R = (c, s; -s, c). (The listing in the extension's text has it the other way round.)
+TextureReference reference(const tinygltf::TextureInfo& info) {
+  TextureReference result{0, texcoord_set(info) == 1 ? 1 : 0, {}};
+  const tinygltf::Value* transform = extension(info.extensions, "KHR_texture_transform");
+  const double angle = number(transform, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
+  const Vec2 scale = pair(transform, "scale", {1, 1});
+  result.transform = {Vec2{c, -s} * scale.x, Vec2{s, c} * scale.y, pair(transform, "offset", {0, 0})};
+  return result;
+}
+
+bool is_emissive(const tinygltf::Material& material) {
+  if (number(extension(material.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1) <= 0)
+    return false;
+  return std::any_of(material.emissiveFactor.begin(), material.emissiveFactor.end(), [](double f) { return f > 0; });
 }
 
 // A decoder is injected: a plane that is not one would crash us later.
@@ -106,9 +129,9 @@ Result<void> MaterialReader::read_reflectance(const tinygltf::Material& source, 
   material.reflectance = {std::fmin(factor.x, limit), std::fmin(factor.y, limit), std::fmin(factor.z, limit)};
   if (pbr.baseColorTexture.index < 0) {
     facts.limited_share = max_component(factor) > limit ? 1 : 0;
+    facts.untextured = factor;
   } else {
-    RADBAKE_ASSIGN_OR_RETURN(material.reflectance_texture,
-                             reference("baseColorTexture", pbr.baseColorTexture.texCoord));
+    material.reflectance_texture = reference(pbr.baseColorTexture);
     RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* plane, decoded(pbr.baseColorTexture.index, true));
     // Count the texels that are too bright, and find the most transparent one.
     std::size_t num_limited = 0;
@@ -136,7 +159,7 @@ Result<void> MaterialReader::read_emission(const tinygltf::Material& source, Mat
   for (int c = 0; c < 3 && !source.emissiveFactor.empty(); ++c) material.emissive[c] = source.emissiveFactor[c];
   material.emissive *= number(extension(source.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
   if (source.emissiveTexture.index < 0 || max_component(material.emissive) == 0) return {};
-  RADBAKE_ASSIGN_OR_RETURN(material.emissive_texture, reference("emissiveTexture", source.emissiveTexture.texCoord));
+  material.emissive_texture = reference(source.emissiveTexture);
   RADBAKE_ASSIGN_OR_RETURN(material.emissive_texture->texture,
                            scene_texture({.texture = source.emissiveTexture.index}));
   return {};
@@ -166,6 +189,23 @@ Result<void> MaterialReader::read(const tinygltf::Material& source, Material& ma
   facts.has_normal_map = source.normalTexture.index >= 0;
   facts.is_unlit = extension(source.extensions, "KHR_materials_unlit") != nullptr;
   return {};
+}
+
+Result<int> MaterialReader::texcoord0_set(int index) const {
+  if (index < 0) return 0;
+  const tinygltf::Material& material = model_.materials[index];
+  const tinygltf::TextureInfo& color = material.pbrMetallicRoughness.baseColorTexture;
+  const tinygltf::TextureInfo& emission = material.emissiveTexture;
+  std::vector<int> sets;
+  if (color.index >= 0) sets.push_back(texcoord_set(color));
+  if (emission.index >= 0 && is_emissive(material)) sets.push_back(texcoord_set(emission));
+  std::erase(sets, 1);
+  if (sets.empty()) return 0;
+  if (sets.front() == sets.back()) return sets.front();
+  return invalid_argument(numbered("material", static_cast<std::size_t>(index), material.name) +
+                          ": baseColorTexture uses TEXCOORD_" + std::to_string(sets.front()) +
+                          " and emissiveTexture TEXCOORD_" + std::to_string(sets.back()) +
+                          "; beside TEXCOORD_1 one set is read");
 }
 
 Result<int> MaterialReader::scene_material(int index) {

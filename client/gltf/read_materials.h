@@ -16,6 +16,7 @@ namespace radbake::gltf {
 /// What a file says of a material and a diffuse bake does not follow, or not fully.
 struct MaterialFacts {
   double limited_share = 0;  ///< of its surface, by texels: reflectance above the limit
+  Vec3 untextured;           ///< base colour factor before it was limited; zero where a texture multiplies it
   bool is_metallic = false;
   bool is_translucent = false;  ///< masked or blended, and not opaque in fact
   bool is_transmissive = false;
@@ -36,6 +37,10 @@ class MaterialReader {
   /// and texture t' = min(f t, limit) / f', the product is exact where it needs no limit.
   /// Errors: kInvalidArgument, naming the material and the texture or image.
   Result<int> scene_material(int material);
+
+  /// Which TEXCOORD_n becomes the texcoord0 of a mesh of a material of the file: the one that its textures use beside
+  /// TEXCOORD_1, else 0. Errors: kInvalidArgument, naming the material whose textures use two.
+  Result<int> texcoord0_set(int material) const;
 
   std::vector<Material>& materials() { return materials_; }
   std::vector<TexturePlane>& textures() { return textures_; }

@@ -31,23 +31,27 @@ std::vector<Warning> scene_warnings(std::span<const Material> materials, std::sp
   const auto share = [&](double area_m2) {
     return " (" + compact(100 * area_m2 / counts.total_area_m2) + " % of the area)";
   };
-  // One warning for all materials of which a fact holds. `part` is the share of a material's surface.
-  const auto warn = [&](const char* id, const std::string& text,
-                        const std::function<double(const MaterialFacts&)>& part) {
+  // One warning for all materials of which a fact holds on some of their area.
+  const auto warn_areas = [&](const char* id, const std::string& text,
+                              const std::function<double(std::size_t)>& area_of) {
     std::vector<std::string> names;
     double area_m2 = 0;
     for (std::size_t i = 0; i < materials.size(); ++i) {
-      if (part(facts[i]) <= 0 || counts.area_m2[i] <= 0) continue;
+      if (area_of(i) <= 0) continue;
       names.push_back(materials[i].name);
-      area_m2 += part(facts[i]) * counts.area_m2[i];
+      area_m2 += area_of(i);
     }
     if (!names.empty()) warnings.push_back({id, text + ": material " + some_of(names) + share(area_m2)});
+  };
+  const auto warn = [&](const char* id, const std::string& text,
+                        const std::function<bool(const MaterialFacts&)>& holds) {
+    warn_areas(id, text, [&](std::size_t i) { return holds(facts[i]) ? counts.area_m2[i] : 0; });
   };
   const auto warn_count = [&](const char* id, std::uint64_t count, const std::string& text) {
     if (count > 0) warnings.push_back({id, std::to_string(count) + " " + text});
   };
-  warn("reflectance_limited", "reflectance limited to " + compact(options.max_reflectance),
-       [](const MaterialFacts& f) { return f.limited_share; });
+  warn_areas("reflectance_limited", "reflectance limited to " + compact(options.max_reflectance),
+             [&](std::size_t i) { return counts.limited_area_m2[i]; });
   warn("metallic_as_diffuse", "metal is baked as a diffuse surface of its base colour",
        [](const MaterialFacts& f) { return f.is_metallic; });
   warn("alpha_not_simulated", "masked and blended surfaces are baked as opaque",
@@ -61,7 +65,8 @@ std::vector<Warning> scene_warnings(std::span<const Material> materials, std::sp
   const auto warn_area = [&](const char* id, double area_m2, const std::string& text) {
     if (area_m2 > 0) warnings.push_back({id, text + share(area_m2)});
   };
-  warn_area("vertex_colors_not_simulated", counts.vertex_colored_area_m2, "vertex colours are ignored");
+  warn_area("vertex_colors_limited", counts.recolored_area_m2, "vertex colours outside 0 to 1 are limited to it");
+  warn_area("vertex_alpha_not_simulated", counts.translucent_color_area_m2, "opacity of vertex colours is ignored");
   warn_area("morph_targets_not_simulated", counts.morphed_area_m2,
             "morph targets are ignored: baked in the base shape");
   warn_area("normals_replaced", counts.renormaled_area_m2,
@@ -72,8 +77,6 @@ std::vector<Warning> scene_warnings(std::span<const Material> materials, std::sp
   warn_count("triangles_dropped", counts.num_triangles_dropped, "triangles of zero area dropped (0 % of the area)");
   warn_count("primitives_skipped", counts.num_points_and_lines,
              "primitives of points or lines skipped: they have no area");
-  warn_count("primitives_skipped", counts.num_strips_and_fans,
-             "primitives of triangle strips or fans skipped: not read by this version");
   warn_count("primitives_skipped", counts.num_skinned, "skinned primitives skipped: what moves is not baked");
   return warnings;
 }

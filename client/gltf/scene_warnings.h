@@ -13,13 +13,14 @@ namespace radbake::gltf {
 /// What reading a scene counted and its warnings tell.
 struct ReadCounts {
   std::vector<double> area_m2;              ///< of each material of the scene, one side
+  std::vector<double> limited_area_m2;      ///< of it, that whose reflectance is above the limit
   std::uint64_t num_triangles_dropped = 0;  ///< of zero area
   std::uint64_t num_points_and_lines = 0;   ///< primitives, with every instance
-  std::uint64_t num_strips_and_fans = 0;
   std::uint64_t num_skinned = 0;
-  double morphed_area_m2 = 0;         ///< of meshes whose morph targets have weights
-  double vertex_colored_area_m2 = 0;  ///< of meshes with COLOR_0
-  double renormaled_area_m2 = 0;      ///< of meshes where unusable normals were replaced
+  double morphed_area_m2 = 0;            ///< of meshes whose morph targets have weights
+  double recolored_area_m2 = 0;          ///< of meshes with colours outside 0 to 1
+  double translucent_color_area_m2 = 0;  ///< of masked and blended meshes whose COLOR_0 has opacity below 1
+  double renormaled_area_m2 = 0;         ///< of meshes where unusable normals were replaced
   double total_area_m2 = 0;
 };
 

@@ -30,7 +30,7 @@ Vec3 area_vector(const Mesh& mesh, std::size_t i) {
   return cross(mesh.positions[t[1]] - mesh.positions[t[0]], mesh.positions[t[2]] - mesh.positions[t[0]]) * 0.5;
 }
 
-TEST(GltfGeometry, KeepsVerticesAndTrianglesAsInTheFile) {
+TEST(GltfGeometry, KeepsTheOrderOfTheFile) {
   const Scene scene = read(square());
   ASSERT_EQ(scene.meshes.size(), 1u);
   const Mesh& mesh = scene.meshes[0];
@@ -133,7 +133,10 @@ TEST(GltfGeometry, ReadsIndicesOfEveryWidth) {
     GltfBuilder file = square();
     file.document["meshes"][0]["primitives"][0]["indices"] =
         file.add_accessor(file.add_view(bytes[i]), types[i], "SCALAR", 3);
-    EXPECT_THAT(read(file).meshes.at(0).triangles, ElementsAre(ElementsAre(0, 2, 3))) << types[i];
+    // The second vertex is used by none.
+    const Mesh mesh = read(file).meshes.at(0);
+    EXPECT_THAT(mesh.triangles, ElementsAre(ElementsAre(0, 1, 2))) << types[i];
+    EXPECT_THAT(mesh.positions, ElementsAre(Vec3{0, 0, 0}, Vec3{1, 1, 0}, Vec3{0, 1, 0})) << types[i];
   }
 }
 
@@ -183,6 +186,70 @@ TEST(GltfGeometry, ReplacesNormalsThatAreNone) {
   ASSERT_TRUE(result.ok());
   for (const Vec3& normal : result->scene.meshes[0].normals) EXPECT_EQ(normal, (Vec3{0, 0, 1}));
   EXPECT_THAT(warning_text(*result, "normals_replaced"), HasSubstr("100 %"));
+}
+
+TEST(GltfGeometry, SaysWhereEachVertexOfTheFileWent) {
+  // Two triangles without an index: the corners of their common edge are there twice, and one triangle has no area.
+  GltfBuilder file;
+  const int positions =
+      file.add_floats({5, 5, 5, 6, 6, 6, 7, 7, 7, 0, 0, 0, 1, 0, 0, 1, 1, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0}, "VEC3");
+  file.add_root({{"mesh", file.add_mesh({{"attributes", {{"POSITION", positions}}}})}});
+  const auto result = read_bytes(file.glb());
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  const Mesh& mesh = result->scene.meshes.at(0);
+  EXPECT_THAT(mesh.positions, ElementsAre(Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{1, 1, 0}, Vec3{0, 1, 0}));
+  EXPECT_THAT(mesh.triangles, ElementsAre(ElementsAre(0, 1, 2), ElementsAre(2, 3, 0)));
+  EXPECT_THAT(result->scene_vertex.at(0), ElementsAre(kNoVertex, kNoVertex, kNoVertex, 0, 1, 2, 2, 3, 0));
+  EXPECT_EQ(result->num_triangles_dropped, 1u);
+}
+
+TEST(GltfGeometry, KeepsVerticesApartThatDifferInAnyAttribute) {
+  const std::vector<float> corners = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0};
+  for (const auto& [name, type, size] : {std::tuple("NORMAL", "VEC3", 3), std::tuple("TEXCOORD_0", "VEC2", 2),
+                                         std::tuple("TEXCOORD_1", "VEC2", 2), std::tuple("COLOR_0", "VEC3", 3)}) {
+    std::vector<float> values;
+    for (int vertex = 0; vertex < 6; ++vertex) {
+      for (int c = 0; c < size; ++c) values.push_back(c == size - 1 ? 1.0f : vertex == 3 ? 0.5f : 0.0f);
+    }
+    GltfBuilder file;
+    const int positions = file.add_floats(corners, "VEC3"), other = file.add_floats(values, type);
+    file.add_root({{"mesh", file.add_mesh({{"attributes", {{"POSITION", positions}, {name, other}}}})}});
+    const auto result = read_bytes(file.glb());
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_THAT(result->scene_vertex.at(0), ElementsAre(0, 1, 2, 3, 2, 4)) << name;
+  }
+}
+
+TEST(GltfGeometry, GivesEveryPlacedNodeAnObjectAndNamesTheSources) {
+  GltfBuilder file = square();
+  file.document["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", 0}}}, {"indices", 1}});
+  file.add_root({{"name", "empty"}});
+  file.add_root({{"mesh", 0}, {"translation", {0, 0, 3}}});
+  const auto result = read_bytes(file.glb());
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  ASSERT_EQ(result->scene.meshes.size(), 4u);
+  ASSERT_EQ(result->sources.size(), 4u);
+  std::vector<std::array<int, 4>> found;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const MeshSource& source = result->sources[i];
+    found.push_back({source.node, source.mesh, source.primitive, result->scene.meshes[i].object});
+  }
+  EXPECT_THAT(found, ElementsAre(ElementsAre(0, 0, 0, 0), ElementsAre(2, 0, 0, 1), ElementsAre(0, 0, 1, 0),
+                                 ElementsAre(2, 0, 1, 1)));
+}
+
+TEST(GltfGeometry, TakesTheTexelDensityOfTheNodeElseOfTheMesh) {
+  GltfBuilder file = square();
+  file.add_root({{"mesh", 0}, {"extras", {{"radbake_texel_density", 2}, {"colour", "of no matter"}}}});
+  file.add_root({{"mesh", 0}, {"extras", "a text"}});
+  const auto densities = [&] {
+    std::vector<double> found;
+    for (const Mesh& mesh : read(file).meshes) found.push_back(mesh.texel_density);
+    return found;
+  };
+  EXPECT_THAT(densities(), ElementsAre(1, 2, 1));
+  file.document["meshes"][0]["extras"] = {{"radbake_texel_density", 0.25}};
+  EXPECT_THAT(densities(), ElementsAre(0.25, 2, 0.25));
 }
 
 TEST(GltfGeometry, SkipsLinesAndSkinnedMeshesWithAWarning) {

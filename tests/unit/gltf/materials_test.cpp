@@ -217,9 +217,118 @@ TEST(GltfMaterials, WarnsOfTransmissionAndUnlit) {
 
 TEST(GltfMaterials, WarnsOfExtensionsThatItIgnores) {
   GltfBuilder file = square();
-  file.document["extensionsUsed"] = {"KHR_materials_ior", "KHR_texture_transform", "ACME_moss"};
-  EXPECT_EQ(warning_text(read(file), "extensions_ignored"),
-            "extensions that are not read: 'KHR_texture_transform', 'ACME_moss'");
+  file.document["extensionsUsed"] = {"KHR_materials_ior", "ACME_sand", "ACME_moss"};
+  EXPECT_EQ(warning_text(read(file), "extensions_ignored"), "extensions that are not read: 'ACME_sand', 'ACME_moss'");
+}
+
+// The square with colours of four floats a vertex.
+GltfBuilder colored(const std::vector<float>& colors) {
+  GltfBuilder file = square();
+  file.document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = file.add_floats(colors, "VEC4");
+  return file;
+}
+
+TEST(GltfMaterials, ReadsVertexColoursOfEveryType) {
+  // Red, about half green, a fifth of blue, white.
+  const std::vector<std::uint8_t> narrow = {255, 0, 0, 255, 0, 128, 0, 255, 0, 0, 51, 255, 255, 255, 255, 255};
+  std::vector<std::uint16_t> wide;
+  std::vector<float> floats;
+  for (const std::uint8_t value : narrow) {
+    wide.push_back(static_cast<std::uint16_t>(value * 257));
+    floats.push_back(static_cast<float>(value) / 255);
+  }
+  for (const int type : {5121, 5123, 5126}) {
+    GltfBuilder file = square();
+    const int view = file.add_view(type == 5121 ? bytes_of(narrow) : type == 5123 ? bytes_of(wide) : bytes_of(floats));
+    const int accessor = file.add_accessor(view, type, "VEC4", 4);
+    file.document["accessors"][accessor]["normalized"] = type != 5126;
+    file.document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = accessor;
+    const GltfScene scene = read(file);
+    const std::vector<Vec3>& colors = scene.scene.meshes.at(0).colors;
+    ASSERT_EQ(colors.size(), 4u);
+    EXPECT_EQ(colors[0], (Vec3{1, 0, 0}));
+    EXPECT_NEAR(colors[1].y, 128 / 255.0, kFloat);
+    EXPECT_NEAR(colors[2].z, 0.2, kFloat);
+    EXPECT_EQ(colors[3], (Vec3{1, 1, 1}));
+    EXPECT_THAT(scene.warnings, IsEmpty());
+  }
+}
+
+TEST(GltfMaterials, LeavesOutVertexColoursThatAreAllWhite) {
+  EXPECT_TRUE(read(colored(std::vector<float>(16, 1.0f))).scene.meshes.at(0).colors.empty());
+}
+
+TEST(GltfMaterials, LimitsTheProductOfFactorAndVertexColour) {
+  // White paint: the limit touches the first vertex only, which one of two equal triangles uses.
+  GltfBuilder file = colored({1, 0.75f, 0.5f, 1, 0.5f, 0.5f, 0.5f, 1, 0.5f, 0.5f, 0.5f, 1, 0.25f, 0.25f, 0.25f, 1});
+  material(file)["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 1};
+  file.document["meshes"][0]["primitives"][0]["indices"] = file.add_indices({0, 1, 2, 3, 2, 1});
+  const GltfScene scene = read(file, 0.8);
+  const Mesh& mesh = scene.scene.meshes.at(0);
+  const auto product = [&](std::size_t i) { return scaled_by(scene.scene.materials[0].reflectance, mesh.colors[i]); };
+  EXPECT_DOUBLE_EQ(product(0).x, 0.8);
+  EXPECT_DOUBLE_EQ(product(0).y, 0.75);
+  EXPECT_DOUBLE_EQ(product(0).z, 0.5);
+  EXPECT_DOUBLE_EQ(product(1).x, 0.5);
+  EXPECT_DOUBLE_EQ(product(3).x, 0.25);
+  EXPECT_THAT(warning_text(scene, "reflectance_limited"), HasSubstr("'grey' (50 %"));
+}
+
+TEST(GltfMaterials, LimitsVertexColoursToOneAndSaysWhatItLeavesOut) {
+  GltfBuilder file = colored({3, 0.5f, -1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0.5f});
+  const GltfScene scene = read(file);
+  EXPECT_EQ(scene.scene.meshes.at(0).colors.at(0), (Vec3{1, 0.5, 0}));
+  EXPECT_THAT(warning_text(scene, "vertex_colors_limited"), HasSubstr("100 %"));
+  EXPECT_EQ(warning_text(scene, "vertex_alpha_not_simulated"), "");
+  material(file)["alphaMode"] = "BLEND";
+  EXPECT_THAT(warning_text(read(file), "vertex_alpha_not_simulated"), HasSubstr("100 %"));
+}
+
+void expect_map(const Scene& scene, Vec2 from, Vec2 to) {
+  ASSERT_TRUE(scene.materials.at(0).reflectance_texture.has_value());
+  const Vec2 image = scene.materials[0].reflectance_texture->transform.apply(from);
+  EXPECT_NEAR(image.x, to.x, kFloat);
+  EXPECT_NEAR(image.y, to.y, kFloat);
+}
+
+TEST(GltfMaterials, ReadsTheTransformOfTextureCoordinates) {
+  constexpr double kQuarterTurn = 1.5707963267948966;
+  GltfBuilder file = textured("1 1 3 0.5 0.5 0.5");
+  const auto transformed = [&](const json& transform) {
+    material(file)["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"] = transform;
+    return read(file).scene;
+  };
+  EXPECT_EQ(read(file).scene.materials.at(0).reflectance_texture->transform, UvTransform{});
+  expect_map(transformed({{"offset", {0.25, 0.5}}}), {0.1, 0.2}, {0.35, 0.7});
+  expect_map(transformed({{"scale", {2, -3}}}), {0.1, 0.2}, {0.2, -0.6});
+  // On the image, whose y points down, a quarter turn counter-clockwise takes right to up.
+  expect_map(transformed({{"rotation", kQuarterTurn}}), {1, 0}, {0, -1});
+  expect_map(transformed({{"rotation", kQuarterTurn}}), {0, 1}, {1, 0});
+  // First the scale, then the turn, last the offset.
+  const json all = {{"offset", {0.5, 0.5}}, {"rotation", kQuarterTurn}, {"scale", {2, 4}}};
+  expect_map(transformed(all), {0.25, 0}, {0.5, 0});
+  expect_map(transformed(all), {0, 0.25}, {1.5, 0.5});
+}
+
+TEST(GltfMaterials, ReadsTheCoordinatesThatTheTexturesName) {
+  GltfBuilder file = textured("1 1 3 0.5 0.5 0.5");
+  const int second = file.add_floats({0, 0, 0.5f, 0, 0.5f, 0.5f, 0, 0.5f}, "VEC2");
+  const int fourth = file.add_floats({0, 0, 0.25f, 0, 0.25f, 0.25f, 0, 0.25f}, "VEC2");
+  file.document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = second;
+  file.document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_3"] = fourth;
+  const auto looked_up = [&] {
+    const Scene scene = read(file).scene;
+    const Mesh& mesh = scene.meshes.at(0);
+    return (scene.materials[0].reflectance_texture->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).at(1).x;
+  };
+  EXPECT_EQ(looked_up(), 1);
+  json& info = material(file)["pbrMetallicRoughness"]["baseColorTexture"];
+  info["texCoord"] = 1;
+  EXPECT_EQ(looked_up(), 0.5);
+  // The extension overrides, and a set that is neither 0 nor 1 takes the place of the first.
+  info["extensions"]["KHR_texture_transform"] = {{"texCoord", 3}};
+  EXPECT_EQ(looked_up(), 0.25);
+  EXPECT_EQ(read(file).scene.meshes.at(0).texcoord1.at(1).x, 0.5);
 }
 
 TEST(GltfMaterials, RefusesALimitThatDoesNotConverge) {

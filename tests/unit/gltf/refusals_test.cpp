@@ -165,13 +165,13 @@ TEST(GltfRefusal, NamesAStrideThatOverlapsElements) {
 TEST(GltfRefusal, NamesAVertexIndexOutOfRange) {
   GltfBuilder file = square();
   file.bin[48 + 2 * 4] = 17;  // fifth index
-  expect_refused(read(file), {"mesh 0 'square'", "accessor 1", "index 17 of triangle 1", "4 vertices"});
+  expect_refused(read(file), {"mesh 0 'square'", "accessor 1 (indices)", "index 17 at corner 4", "4 vertices"});
 }
 
 TEST(GltfRefusal, NamesATriangleThatIsNotWhole) {
   GltfBuilder file = square();
   file.document["accessors"][1]["count"] = 5;
-  expect_refused(read(file), {"accessor 1", "counts 5", "three"});
+  expect_refused(read(file), {"accessor 1 (indices)", "5 corners", "three"});
 }
 
 TEST(GltfRefusal, NamesAPositionThatIsNotFinite) {
@@ -220,24 +220,138 @@ TEST(GltfRefusal, SaysWhenOnlyPrimitivesWithoutTrianglesAreThere) {
 }
 
 TEST(GltfRefusal, NamesARequiredExtensionThatItDoesNotKnow) {
-  for (const char* extension : {"KHR_texture_transform", "KHR_mesh_quantization", "ACME_walls"}) {
+  for (const char* extension : {"EXT_meshopt_compression", "KHR_texture_basisu", "ACME_walls"}) {
     GltfBuilder file = square();
     file.document["extensionsRequired"] = {extension};
     expect_refused(read(file), {"required extension", extension, "not supported"});
   }
 }
 
-TEST(GltfRefusal, NamesASparseAccessor) {
+TEST(GltfRefusal, NamesAStripOrFanThatIsNotATriangle) {
   GltfBuilder file = square();
-  file.document["accessors"][0]["sparse"] = {
-      {"count", 1}, {"indices", {{"bufferView", 1}, {"componentType", 5123}}}, {"values", {{"bufferView", 0}}}};
-  expect_refused(read(file), {"accessor 0 (POSITION)", "sparse"});
+  file.document["accessors"][1]["count"] = 2;
+  file.document["meshes"][0]["primitives"][0]["mode"] = 5;
+  expect_refused(read(file), {"accessor 1 (indices)", "triangle strip has 2 corners, fewer than three"});
+  file.document["meshes"][0]["primitives"][0]["mode"] = 6;
+  expect_refused(read(file), {"accessor 1 (indices)", "triangle fan has 2 corners, fewer than three"});
 }
 
-TEST(GltfRefusal, NamesQuantisedPositions) {
+// The square whose last vertex is replaced by one of a sparse list: index in view 2, value in view 3.
+GltfBuilder sparse_square(const std::vector<std::uint16_t>& indices = {3}) {
   GltfBuilder file = square();
-  file.document["accessors"][0]["componentType"] = 5122;
-  expect_refused(read(file), {"accessor 0 (POSITION)", "5122"});
+  const int index_view = file.add_view(bytes_of(indices));
+  const int value_view = file.add_view(bytes_of(std::vector<float>(3 * indices.size(), 0.5f)));
+  file.document["accessors"][0]["sparse"] = {{"count", indices.size()},
+                                             {"indices", {{"bufferView", index_view}, {"componentType", 5123}}},
+                                             {"values", {{"bufferView", value_view}}}};
+  return file;
+}
+
+TEST(GltfRefusal, NamesASparseListThatIsNoneOrTooLong) {
+  ASSERT_TRUE(read(sparse_square()).ok());
+  GltfBuilder file = sparse_square();
+  json& sparse = file.document["accessors"][0]["sparse"];
+  sparse["count"] = 5;
+  expect_refused(read(file), {"accessor 0, sparse: count is 5", "the accessor's 4"});
+  sparse["count"] = 0;
+  expect_refused(read(file), {"accessor 0, sparse: count is 0"});
+  sparse["count"] = 2;
+  expect_refused(read(file), {"accessor 0, sparse, indices: its 2 elements end at byte 4 of buffer view 2"});
+  sparse["indices"]["bufferView"] = 0;
+  expect_refused(read(file), {"accessor 0, sparse, values: its 2 elements end at byte 24 of buffer view 3"});
+  sparse["values"]["bufferView"] = 9;
+  expect_refused(read(file), {"accessor 0, sparse, values: bufferView is 9"});
+  sparse.erase("values");
+  expect_refused(read(file), {"accessor 0, sparse: values is missing"});
+  sparse["indices"]["componentType"] = 5122;
+  expect_refused(read(file), {"accessor 0, sparse, indices: componentType is 5122"});
+  file.document["accessors"][0]["sparse"] = true;
+  expect_refused(read(file), {"accessor 0: sparse is true, not an object"});
+}
+
+TEST(GltfRefusal, NamesASparseIndexThatIsNoElementOrDoesNotAscend) {
+  expect_refused(read(sparse_square({4})), {"accessor 0 (POSITION): its sparse index 0 is 4", "4 elements"});
+  expect_refused(read(sparse_square({2, 2})), {"accessor 0 (POSITION): its sparse index 1 is 2 after 2", "ascend"});
+  expect_refused(read(sparse_square({3, 1})), {"accessor 0 (POSITION): its sparse index 1 is 1 after 3", "ascend"});
+}
+
+TEST(GltfRefusal, BoundsWhatAnAccessorWithoutAViewMayCount) {
+  GltfBuilder file = square();
+  file.document["accessors"][0].erase("bufferView");
+  file.document["accessors"][0]["count"] = 40'000'000;
+  expect_refused(read(file), {"accessor 0 (POSITION) counts 40000000 elements without a bufferView", "1000000"});
+}
+
+TEST(GltfRefusal, NamesAnAttributeOfATypeThatItCannotHave) {
+  const auto with = [](const char* attribute, int type, const char* vector, bool is_normalized) {
+    GltfBuilder file = square();
+    const int accessor = file.add_accessor(file.add_view(std::string(128, '\0')), type, vector, 4);
+    file.document["accessors"][accessor]["normalized"] = is_normalized;
+    file.document["meshes"][0]["primitives"][0]["attributes"][attribute] = accessor;
+    return file;
+  };
+  expect_refused(read(with("POSITION", 5125, "VEC3", false)),
+                 {"accessor 2 (POSITION) holds 32-bit unsigned integers, not floats or integers of 8 or 16 bits"});
+  expect_refused(read(with("NORMAL", 5120, "VEC3", false)),
+                 {"accessor 2 (NORMAL) holds 8-bit signed integers", "normalised signed"});
+  expect_refused(read(with("NORMAL", 5121, "VEC3", true)), {"accessor 2 (NORMAL) holds normalised 8-bit unsigned"});
+  expect_refused(read(with("TEXCOORD_0", 5126, "VEC3", false)), {"accessor 2 (TEXCOORD_0) holds 3 numbers", "not 2"});
+  expect_refused(read(with("COLOR_0", 5123, "VEC4", false)), {"accessor 2 (COLOR_0) holds 16-bit unsigned integers"});
+  expect_refused(read(with("COLOR_0", 5126, "VEC2", false)), {"accessor 2 (COLOR_0) holds 2 numbers", "not 3 or 4"});
+  expect_refused(read(with("COLOR_0", 5126, "MAT2", false)), {"accessor 2 (COLOR_0) holds no vectors"});
+}
+
+TEST(GltfRefusal, NamesAColourThatIsNotFinite) {
+  GltfBuilder file = square();
+  std::vector<float> colors(16, 1.0f);
+  colors[9] = std::numeric_limits<float>::quiet_NaN();
+  file.document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = file.add_floats(colors, "VEC4");
+  expect_refused(read(file), {"accessor 2 (COLOR_0): the value of vertex 2 is NaN"});
+}
+
+TEST(GltfRefusal, NamesATextureTransformThatIsNone) {
+  const auto with = [](const char* key, const json& value) {
+    GltfBuilder file = square();
+    const int uv = file.add_floats({0, 0, 1, 0, 1, 1, 0, 1}, "VEC2");
+    file.document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv;
+    file.add("images", {{"bufferView", file.add_view("1 1 3 0.5 0.5 0.5")}, {"mimeType", "image/png"}});
+    file.add("textures", {{"source", 0}});
+    file.document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {
+        {"index", 0}, {"extensions", {{"KHR_texture_transform", {{key, value}}}}}};
+    return file;
+  };
+  const std::string place = "material 0 'grey', pbrMetallicRoughness, baseColorTexture, KHR_texture_transform: ";
+  EXPECT_TRUE(read(with("offset", {2, 3})).ok());
+  expect_refused(read(with("offset", 3)), {(place + "offset is 3, not 2 numbers").c_str()});
+  expect_refused(read(with("scale", {1, 2, 3})), {(place + "scale is an array of 3, not 2 numbers").c_str()});
+  expect_refused(read(with("scale", {1, 1e300})), {(place + "scale[1] is 1e+300").c_str()});
+  // JSON has no NaN: it comes as null.
+  expect_refused(read(with("offset", {0, nullptr})), {(place + "offset[1] is null").c_str()});
+  expect_refused(read(with("rotation", "half")), {(place + "rotation is 'half'").c_str()});
+  expect_refused(read(with("texCoord", -1)), {(place + "texCoord").c_str()});
+  expect_refused(read(with("texCoord", 3)), {"mesh 0 'square'", "texture on TEXCOORD_3, which the primitive lacks"});
+}
+
+TEST(GltfRefusal, NamesAMaterialWhoseTexturesNeedTwoSets) {
+  GltfBuilder file = square();
+  file.add("images", {{"bufferView", file.add_view("1 1 3 0.5 0.5 0.5")}, {"mimeType", "image/png"}});
+  file.add("textures", {{"source", 0}});
+  json& material = file.document["materials"][0];
+  material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}, {"texCoord", 2}};
+  material["emissiveTexture"] = {{"index", 0}, {"texCoord", 0}};
+  material["emissiveFactor"] = {1, 1, 1};
+  expect_refused(read(file), {"material 0 'grey'", "baseColorTexture uses TEXCOORD_2", "emissiveTexture TEXCOORD_0"});
+}
+
+TEST(GltfRefusal, NamesATexelDensityOutOfRange) {
+  for (const json& value : {json(0), json(-1), json(65), json("fine")}) {
+    GltfBuilder file = square();
+    file.document["nodes"][0]["extras"]["radbake_texel_density"] = value;
+    expect_refused(read(file), {"node 0 'wall', extras: radbake_texel_density is "});
+    file = square();
+    file.document["meshes"][0]["extras"]["radbake_texel_density"] = value;
+    expect_refused(read(file), {"mesh 0 'square', extras: radbake_texel_density is "});
+  }
 }
 
 TEST(GltfRefusal, NamesARotationThatIsNone) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -20,7 +21,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-const std::filesystem::path kScenes = RADBAKE_TEST_SCENES;
+const std::filesystem::path kScenes = RADBAKE_TEST_SCENES, kConformance = RADBAKE_CONFORMANCE;
 
 Result<TexturePlane> decode(std::span<const std::byte> bytes, const std::string& name, bool is_srgb) {
   return image::decode_image(bytes, name, is_srgb);
@@ -135,6 +136,45 @@ TEST_P(DamagedScene, GetsAnAnswerWhateverNumbersItsJsonHolds) {
 
 INSTANTIATE_TEST_SUITE_P(Files, DamagedScene, ::testing::Values("cornell.glb", "tile-game-room6.glb"),
                          [](const auto& file) { return file.index == 0 ? "Cornell" : "GameRoom"; });
+
+// What a file of the conformance set may be damaged to. Binary or text, the JSON has digits to change, and what is not
+// JSON is base64 or a chunk.
+std::string damaged(std::string bytes, std::mt19937& random) {
+  std::vector<std::size_t> digits;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    if (bytes[i] >= '0' && bytes[i] <= '9') digits.push_back(i);
+  }
+  for (unsigned changes = 1 + random() % 3; changes > 0; --changes) {
+    switch (random() % 4) {
+      case 0: bytes[random() % bytes.size()] ^= char(1u << random() % 8); break;
+      case 1: bytes.insert(digits[random() % digits.size()], 1, "0123456789-e."[random() % 13]); break;
+      default: bytes[digits[random() % digits.size()]] = "0123456789-e."[random() % 13];
+    }
+  }
+  return bytes;
+}
+
+TEST(DamagedConformanceSet, GetsAnAnswerForEachFile) {
+  const TemporaryFolder folder;
+  for (const auto& entry : std::filesystem::directory_iterator(kConformance)) {
+    if (entry.path().extension() == ".bin") std::filesystem::copy(entry.path(), folder.path());
+  }
+  std::mt19937 random(3);
+  int num_variants = 0, num_refused = 0;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(kConformance)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());  // the same bytes on every run
+  for (const std::filesystem::path& file : files) {
+    if (file.extension() != ".gltf" && file.extension() != ".glb") continue;
+    std::ostringstream good;
+    good << std::ifstream(file, std::ios::binary).rdbuf();
+    for (int variant = 0; variant < 200; ++variant, ++num_variants) {
+      expect_an_answer(folder, damaged(good.str(), random), num_refused);
+    }
+  }
+  EXPECT_GT(num_refused, num_variants / 10);
+  EXPECT_LT(num_refused, num_variants);
+}
 
 }  // namespace
 }  // namespace radbake::gltf

@@ -100,7 +100,7 @@ ExitCode run_cancel(const CommandContext& context) {
 }
 
 ExitCode run_download(const CommandContext& context) {
-  Result<ResultFolder> folder = ResultFolder::open(context.line.output, context.line.force);
+  Result<ResultFolder> folder = ResultFolder::open(context.line.folder, context.line.force);
   if (!folder.ok()) return fail(context, folder.error(), kUsage);
   Stopwatch stages;
   Result<Session> session = open_session(context);
@@ -116,8 +116,17 @@ ExitCode run_download(const CommandContext& context) {
   }
   const ExitCode code = exit_code_of(*bake);
   if (code != kDone) return fail(context, error_of(*bake), code);
-  const Result<void> written =
-      write_results(session->client, *bake, std::nullopt, *folder, stages, context.reporter, context.interrupt.once());
+  const std::stop_token stop = context.interrupt.once();
+  std::optional<BakedScene> scene;
+  if (context.line.scene.empty()) {
+    context.reporter.note("scene.glb and lightmaps.json need the scene that was baked: --scene FILE");
+  } else {
+    Result<BakedScene> read = read_scene_of(session->client, *bake, context.line.scene, stop);
+    if (!read.ok()) return fail(context, read.error());
+    scene = std::move(read).value();
+  }
+  const Result<void> written = write_results(session->client, {*bake, std::nullopt, scene, context.line.files}, *folder,
+                                             stages, context.reporter, stop);
   return written.ok() ? kDone : fail(context, written.error());
 }
 

@@ -1,8 +1,10 @@
 #include "client/cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <map>
 #include <sstream>
 
 #include "client/cli/exit_code.h"
@@ -13,6 +15,13 @@ namespace radbake::cli {
 namespace {
 
 constexpr std::uint32_t kMinAtlasSize = 64, kMaxAtlasSize = 4096;
+constexpr double kMinDensity = 1e-3, kMaxDensity = 1e5;
+const std::map<std::string, v1::LightmapUv> kLightmapUvs = {
+    {"auto", v1::LIGHTMAP_UV_AUTO}, {"keep", v1::LIGHTMAP_UV_KEEP}, {"unwrap", v1::LIGHTMAP_UV_UNWRAP}};
+const std::map<std::string, v1::Output> kOutputs = {
+    {"lightmap", v1::OUTPUT_LIGHTMAP}, {"vertices", v1::OUTPUT_VERTICES}, {"both", v1::OUTPUT_BOTH}};
+const std::map<std::string, Encoding> kEncodings = {
+    {"exr", Encoding::kExr}, {"hdr", Encoding::kHdr}, {"png-rgbm", Encoding::kRgbmPng}};
 constexpr char kServerHelp[] = "HOST:PORT or unix:PATH of a radbaked (environment: RADBAKE_SERVER)";
 constexpr char kExitCodes[] =
     "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, 5 bake failed, 6 cancelled, 130 left by Ctrl-C.\n";
@@ -25,13 +34,22 @@ constexpr char kMainFooter[] =
     "  export RADBAKE_SERVER=bakery:7419; radbake list   what the server bakes and has baked\n\n";
 
 constexpr char kSubmitFooter[] =
-    "\nWrites to DIR, when all is done: lightmap_0.exr (irradiance in lx, linear Rec.709, float32; alpha is "
-    "coverage),\n"
-    "lightmap_0.png (an exposed preview) and report.json. The first line on stdout is the job's name.\n"
-    "Ctrl-C cancels the job.\n"
+    "\nWrites to DIR, when all is done:\n"
+    "  scene.glb        the scene with its light: nothing lost, final TEXCOORD_1, the lightmap as MOZ_lightmap,\n"
+    "                   light by vertex as _IRRADIANCE\n"
+    "  lightmap_N.exr   irradiance in lx, linear Rec.709, float32; alpha is coverage; see --encoding\n"
+    "  lightmap_N.png   an exposed preview, for the eye only\n"
+    "  lightmaps.json   which primitive of which node lies where in which lightmap\n"
+    "  report.json      what was done, how well, and how long it took\n"
+    "The first line on stdout is the job's name. Ctrl-C cancels the job.\n"
     "\nExamples:\n"
     "  radbake submit room.glb -o baked/\n"
-    "      the atlas is the smallest power of two that gives 32 texels a metre\n"
+    "      the lightmap is the smallest that gives 32 texels a metre; meshes without a usable TEXCOORD_1 are "
+    "unwrapped\n"
+    "  radbake submit level.glb -o baked/ --atlas-size 1024 --texels-per-meter 16 --encoding exr,png-rgbm\n"
+    "      sheets of 1024 texels, as many as it takes; for an engine that reads RGBM too\n"
+    "  radbake submit town.glb -o baked/ --output vertices --vertex-colors\n"
+    "      no lightmap: light at each vertex, and as COLOR_0 for viewers that know nothing else\n"
     "  radbake submit room.glb -o baked/ --force --atlas-size 512 --rays 256\n"
     "      a quick preview over the results of an earlier bake\n"
     "  radbake submit house.glb -o baked/ --sky 3000,3500,5000 --sun 0.4,-1,0.3:80000,76000,70000\n"
@@ -56,8 +74,10 @@ constexpr char kCancelFooter[] =
     "  radbake cancel bakes/3f9c --server bakery:7419\n\n";
 
 constexpr char kDownloadFooter[] =
-    "\nWrites what submit would have written. Results wait on the server for who asks.\n"
+    "\nWrites what submit would have written; scene.glb and lightmaps.json need the scene that was baked: --scene.\n"
+    "Results wait on the server for who asks.\n"
     "\nExamples:\n"
+    "  radbake download bakes/3f9c -o baked/ --scene room.glb --server bakery:7419\n"
     "  radbake download bakes/3f9c -o baked/ --server bakery:7419\n"
     "  radbake download bakes/3f9c -o baked/ --force     over the results of an earlier bake\n\n";
 
@@ -71,6 +91,16 @@ template <typename T>
 T value_or_throw(const char* option, Result<T> parsed) {
   if (!parsed.ok()) throw CLI::ValidationError(option, parsed.error().message);
   return std::move(parsed).value();
+}
+
+/// The value of a word; CLI11's exception names the words that there are.
+template <typename T>
+T word_or_throw(const char* option, const std::map<std::string, T>& words, const std::string& text) {
+  const auto it = words.find(text);
+  if (it != words.end()) return it->second;
+  std::string known;
+  for (const auto& [word, value] : words) known += (known.empty() ? "" : ", ") + word;
+  throw CLI::ValidationError(option, "'" + text + "' is none of " + known);
 }
 
 bool is_all_digits(const std::string& text) {
@@ -99,6 +129,13 @@ std::string check_seed(const std::string& text) {
   return "'" + text + "' is not a whole number from 0 to " + std::to_string(UINT64_MAX);
 }
 
+std::string check_density(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (!text.empty() && *end == '\0' && value >= kMinDensity && value <= kMaxDensity) return "";
+  return "'" + text + "' is not a number from 0.001 to 100000";
+}
+
 std::string check_reflectance(const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
@@ -121,7 +158,10 @@ class Parser {
     CLI::App* download =
         add_command(Command::kDownload, "download", "Write a bake's results to a folder", kDownloadFooter);
     add_job(download);
-    add_output(download);
+    add_folder(download);
+    add_files(download);
+    download->add_option("--scene", line_.scene, "The .glb or .gltf file that was baked: writes scene.glb as well")
+        ->type_name("SCENE");
     add_command(Command::kCapabilities, "capabilities", "Say what a server can do, and its limits",
                 kCapabilitiesFooter);
   }
@@ -142,6 +182,9 @@ class Parser {
       return EarlyExit{kUsage, "",
                        "radbake " + app_.get_subcommands().front()->get_name() +
                            " needs a server: --server HOST:PORT or unix:PATH, or RADBAKE_SERVER\n"};
+    }
+    if (line_.command == Command::kSubmit && line_.files.vertex_colors && line_.bake.output == v1::OUTPUT_LIGHTMAP) {
+      return EarlyExit{kUsage, "", "--vertex-colors needs light by vertex: --output vertices or --output both\n"};
     }
     // Both the name that submit prints and the bare id name a job.
     if (!line_.job.empty() && line_.job.rfind("bakes/", 0) != 0) line_.job = "bakes/" + line_.job;
@@ -165,23 +208,64 @@ class Parser {
     sub->add_option("JOB", line_.job, "The bake's name, as submit prints it")->required()->type_name("");
   }
 
-  void add_output(CLI::App* sub) {
-    sub->add_option("-o,--output", line_.output, "Folder for the results; is made where there is none")
+  void add_folder(CLI::App* sub) {
+    sub->add_option("-o,--out", line_.folder, "Folder for the results; is made where there is none")
         ->required()
         ->type_name("DIR");
     sub->add_flag("--force", line_.force, "Write to DIR even if it is not empty");
+  }
+
+  void add_files(CLI::App* sub) {
+    sub->add_option_function<std::string>(
+           "--encoding", [this](const std::string& text) { line_.files.encodings = parse_encodings(text); },
+           "Files of each lightmap, one or more of exr (float32, exact), hdr (Radiance), png-rgbm (8 bits, linear "
+           "RGBM; the multiplier is in lightmaps.json); default: exr. The picture inside scene.glb is apart from these")
+        ->type_name("LIST");
+    sub->add_flag("--vertex-colors", line_.files.vertex_colors,
+                  "With light by vertex: write it as COLOR_0 too, over the scene's maximum; colours that are there "
+                  "multiply it and stay as _COLOR_0_SOURCE");
+  }
+
+  static std::vector<Encoding> parse_encodings(const std::string& text) {
+    std::vector<Encoding> encodings;
+    std::istringstream words(text + ",");
+    for (std::string word; std::getline(words, word, ',');) {
+      const Encoding encoding = word_or_throw("--encoding", kEncodings, word);
+      const bool is_new = std::find(encodings.begin(), encodings.end(), encoding) == encodings.end();
+      if (is_new) encodings.push_back(encoding);
+    }
+    return encodings;
   }
 
   void add_submit() {
     CLI::App* sub = add_command(Command::kSubmit, "submit", "Bake a glTF scene", kSubmitFooter);
     BakeChoices& bake = line_.bake;
     sub->add_option("SCENE", line_.scene, "A .glb or .gltf file")->required()->type_name("");
-    add_output(sub);
+    add_folder(sub);
+    sub->add_option_function<std::string>(
+           "--output", [&bake](const std::string& text) { bake.output = word_or_throw("--output", kOutputs, text); },
+           "What receives the light: lightmap (images), vertices (of the meshes, in scene.glb) or both; default: "
+           "lightmap")
+        ->type_name("WHAT");
+    sub->add_option_function<std::string>(
+           "--lightmap-uv",
+           [&bake](const std::string& text) { bake.lightmap_uv = word_or_throw("--lightmap-uv", kLightmapUvs, text); },
+           "The lightmap's layout: auto keeps each mesh's own TEXCOORD_1 where it is valid (inside 0..1, no overlap) "
+           "and unwraps the others; keep refuses a mesh without a valid one; unwrap makes all anew; default: auto")
+        ->type_name("HOW");
+    sub->add_option(
+           "--texels-per-meter", bake.texels_per_meter,
+           "Density of the lightmap; an object's own factor on it is radbake_texel_density in the extras of its "
+           "node or mesh")
+        ->check(check_density, "")
+        ->capture_default_str()
+        ->type_name("D");
     sub->add_option("--atlas-size", bake.atlas_size,
-                    "Texels along a side of the lightmap, a power of two from 64 to 4096; default: the smallest that "
-                    "gives 32 texels a metre")
+                    "Size of a lightmap's sheet: texels along a side, a power of two from 64 to 4096; where one is "
+                    "full, another is begun; default: as small as holds the scene at that density")
         ->check(check_atlas_size, "")
         ->type_name("N");
+    add_files(sub);
     sub->add_option_function<std::string>(
            "--sky", [&bake](const std::string& text) { bake.sky = value_or_throw("--sky", parse_rgb(text)); },
            "Light from a constant sky: luminance in nit, linear Rec.709")

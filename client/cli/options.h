@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/scene/scene.h"
+#include "radbake/v1/settings.pb.h"
 
 namespace radbake::cli {
 
@@ -16,6 +17,9 @@ enum class Command { kSubmit, kList, kWatch, kCancel, kDownload, kCapabilities }
 /// What decides a bake. Zero means: the server's default.
 struct BakeChoices {
   std::uint32_t atlas_size = 0;
+  double texels_per_meter = 32;
+  v1::LightmapUv lightmap_uv = v1::LIGHTMAP_UV_AUTO;
+  v1::Output output = v1::OUTPUT_LIGHTMAP;
   std::uint32_t rays = 0;
   std::uint32_t max_patches = 0;
   std::uint64_t seed = 0;
@@ -25,16 +29,26 @@ struct BakeChoices {
   std::optional<DirectionalLight> sun;
 };
 
+/// A kind of image file.
+enum class Encoding { kExr, kHdr, kRgbmPng };
+
+/// Which files are written.
+struct FileChoices {
+  std::vector<Encoding> encodings = {Encoding::kExr};  ///< of the lightmaps, each once
+  bool vertex_colors = false;                          ///< light by vertex as COLOR_0 too
+};
+
 /// A valid command line.
 struct CommandLine {
   Command command = Command::kCapabilities;
   std::string server;  ///< empty: a private one
   bool json = false;
-  std::filesystem::path scene;   ///< submit
+  std::filesystem::path scene;   ///< submit; download: empty where it is not given
   BakeChoices bake;              ///< submit
   std::string job;               ///< watch, cancel, download: bakes/ID
-  std::filesystem::path output;  ///< submit, download
+  std::filesystem::path folder;  ///< submit, download
   bool force = false;            ///< submit, download
+  FileChoices files;             ///< submit, download
 };
 
 /// The program is to print this and end: help, version, or what is wrong with the command line.

@@ -5,6 +5,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/proto_json.h"
 #include "client/cli/results.h"
+#include "client/cli/scene_file.h"
 #include "client/cli/scene_light.h"
 #include "client/gltf/read_gltf.h"
 #include "client/image/image_codec.h"
@@ -37,33 +38,32 @@ v1::SubmitBakeRequest make_request(const CommandLine& line, const Digest& manife
   settings.set_rays(line.bake.rays);
   settings.set_max_patches(line.bake.max_patches);
   settings.set_seed(line.bake.seed);
+  settings.set_texels_per_meter(line.bake.texels_per_meter);
+  settings.set_lightmap_uv(line.bake.lightmap_uv);
+  settings.set_output(line.bake.output);
   request.mutable_run()->set_threads(line.bake.threads);
   // Protobuf's texts are UTF-8, file names are bytes.
   request.set_label(to_utf8(line.scene.filename().string()));
   return request;
 }
 
+/// A scene that is ready to be sent, and what is to be known of it afterwards.
+struct Prepared {
+  EncodedScene encoded;
+  std::optional<SceneReport> report;
+  std::optional<BakedScene> scene;
+};
+
 /// Reads the scene, with the command line's lights, and encodes it.
-Result<EncodedScene> prepare(const CommandContext& context, SceneReport& report, Stopwatch& stages) {
+Result<Prepared> prepare(const CommandContext& context, Stopwatch& stages) {
   const CommandLine& line = context.line;
   const std::stop_token stop = context.interrupt.once();
   context.reporter.stage("reading", -1);
-  gltf::ReadOptions options;
-  options.max_reflectance = line.bake.max_reflectance;
-  // That the image library cannot be loaded is no fault of the scene, as the reader would say.
-  std::optional<Error> not_loaded;
-  const auto decode_image = [&](std::span<const std::byte> bytes, const std::string& name,
-                                bool is_srgb) -> Result<TexturePlane> {
-    const Result<const image::ImageCodec*> images = image::load_image_codec();
-    if (images.ok()) return (*images)->decode_image(bytes, name, is_srgb, image::kDefaultMaxSide);
-    return not_loaded.emplace(images.error());
-  };
-  Result<gltf::GltfScene> scene = gltf::read_gltf(line.scene, decode_image, options);
-  if (not_loaded) return *not_loaded;
-  RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, std::move(scene));
+  RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, read_scene(line.scene, line.bake.max_reflectance));
   add_sky_and_sun(line.bake.sky, line.bake.sun, read.scene);
   for (const Warning& warning : read.warnings) context.reporter.warning(warning);
   RADBAKE_RETURN_IF_ERROR(require_light(read.scene, line.scene.filename().string()));
+  SceneReport report;
   report.num_triangles_dropped = read.num_triangles_dropped;
   report.warnings = std::move(read.warnings);
   stages.end_stage("read");
@@ -72,11 +72,13 @@ Result<EncodedScene> prepare(const CommandContext& context, SceneReport& report,
   context.reporter.stage("encoding", -1);
   EncodeOptions encoding;
   encoding.atlas_size = static_cast<int>(line.bake.atlas_size);
+  encoding.texels_per_meter = line.bake.texels_per_meter;
   RADBAKE_ASSIGN_OR_RETURN(EncodedScene encoded, encode_scene(read.scene, encoding));
   report.mesh_transfer = encoded.transfer;
+  RADBAKE_ASSIGN_OR_RETURN(BakedScene kept, keep_for_writing(line.scene, std::move(read), encoded));
   stages.end_stage("encode");
   if (stop.stop_requested()) return interrupted();
-  return encoded;
+  return Prepared{std::move(encoded), std::move(report), std::move(kept)};
 }
 
 Result<v1::Bake> upload_and_submit(const CommandContext& context, api::Client& client, const EncodedScene& encoded,
@@ -118,7 +120,7 @@ Result<v1::Bake> follow(const CommandContext& context, api::Client& client, cons
 
 ExitCode run_submit(const CommandContext& context) {
   const CommandLine& line = context.line;
-  Result<ResultFolder> folder = ResultFolder::open(line.output, line.force);
+  Result<ResultFolder> folder = ResultFolder::open(line.folder, line.force);
   if (!folder.ok()) return fail(context, folder.error(), kUsage);
   Stopwatch stages;
   context.reporter.stage("connecting", -1);
@@ -131,10 +133,9 @@ ExitCode run_submit(const CommandContext& context) {
   // Load the image library aside: it costs 0.3 s of one core, and results are to be written as soon as they are there.
   auto loading = std::async(std::launch::async, [] { return image::load_image_codec(); });
 
-  SceneReport scene;
-  Result<EncodedScene> encoded = prepare(context, scene, stages);
-  if (!encoded.ok()) return fail(context, encoded.error());
-  Result<v1::Bake> bake = upload_and_submit(context, session->client, *encoded, stages);
+  Result<Prepared> prepared = prepare(context, stages);
+  if (!prepared.ok()) return fail(context, prepared.error());
+  Result<v1::Bake> bake = upload_and_submit(context, session->client, prepared->encoded, stages);
   if (!bake.ok()) return fail(context, session->explain(bake.error()));
   const std::string name = bake->name();
   // Not after the bake: hours of work would be out of reach, on a private server for ever.
@@ -143,7 +144,7 @@ ExitCode run_submit(const CommandContext& context) {
     if (!line.server.empty()) error.message += "; " + name + " goes on: see radbake download " + name;
     return fail(context, error);
   }
-  encoded->blobs.clear();  // what the server has needs no place here for the hours of a bake
+  prepared->encoded.blobs.clear();  // what the server has needs no place here for the hours of a bake
 
   bake = follow(context, session->client, name);
   if (!bake.ok()) {
@@ -154,8 +155,8 @@ ExitCode run_submit(const CommandContext& context) {
   stages.end_stage("bake");
   if (bake->state() != v1::SUCCEEDED) return fail(context, error_of(*bake), exit_code_of(*bake));
 
-  const Result<void> written =
-      write_results(session->client, *bake, scene, *folder, stages, context.reporter, context.interrupt.twice());
+  const Result<void> written = write_results(session->client, {*bake, prepared->report, prepared->scene, line.files},
+                                             *folder, stages, context.reporter, context.interrupt.twice());
   if (!written.ok()) return fail(context, session->explain(written.error()));
   return kDone;
 }

@@ -5,6 +5,8 @@
 #include <exception>
 #include <string>
 
+#include "client/gltf/check_document.h"
+#include "client/gltf/container.h"
 #include "client/gltf/write_document.h"
 #include "client/gltf/write_materials.h"
 #include "client/gltf/write_primitive.h"
@@ -187,6 +189,17 @@ Result<void> write_gltf(const std::filesystem::path& path, const std::filesystem
   } catch (const std::exception& error) {
     return invalid_argument(source.filename().string() + ": cannot be written again: " + error.what());
   }
+}
+
+Result<std::vector<std::string>> read_node_names(const std::filesystem::path& path) {
+  RADBAKE_ASSIGN_OR_RETURN(const Container file, read_container(path));
+  RADBAKE_ASSIGN_OR_RETURN(const nlohmann::json document, parse_json(file.json));
+  std::vector<std::string> names;
+  for (const auto& node : document.value("nodes", nlohmann::json::array())) {
+    const bool is_named = node.is_object() && node.contains("name") && node["name"].is_string();
+    names.push_back(is_named ? node["name"].get<std::string>() : "");
+  }
+  return names;
 }
 
 }  // namespace radbake::gltf

@@ -48,4 +48,7 @@ Result<void> write_gltf(const std::filesystem::path& path, const std::filesystem
                         const std::vector<BakedMesh>& baked, const std::vector<LightmapImage>& lightmaps,
                         const WriteOptions& options);
 
+/// The nodes' names as the file says them, empty where it does not. Errors: kInvalidArgument, as read_gltf().
+Result<std::vector<std::string>> read_node_names(const std::filesystem::path& path);
+
 }  // namespace radbake::gltf

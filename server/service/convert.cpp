@@ -66,6 +66,8 @@ v1::Bake to_message(const store::JobRecord& record, const jobs::Job::LatestProgr
   bake.set_label(record.label);
   bake.set_created_unix_ms(record.created_unix_ms);
   bake.set_finished_unix_ms(record.finished_unix_ms);
+  *bake.mutable_manifest() = to_message(record.work.manifest);
+  bake.mutable_settings()->ParseFromString(record.work.settings);
   if (latest.version > 0) *bake.mutable_progress() = to_message(latest.progress);
   if (!record.result.empty()) bake.mutable_result()->ParseFromString(record.result);
   if (record.error) *bake.mutable_error() = to_message(*record.error);

@@ -42,6 +42,15 @@ TEST_F(Options, ReadsEveryChoiceOfSubmit) {
                                                  "bakery:7419",
                                                  "--atlas-size",
                                                  "256",
+                                                 "--texels-per-meter",
+                                                 "12.5",
+                                                 "--lightmap-uv",
+                                                 "unwrap",
+                                                 "--output",
+                                                 "both",
+                                                 "--encoding",
+                                                 "png-rgbm,exr,exr",
+                                                 "--vertex-colors",
                                                  "--sky",
                                                  "1,2,3.5",
                                                  "--sun",
@@ -61,8 +70,13 @@ TEST_F(Options, ReadsEveryChoiceOfSubmit) {
   EXPECT_EQ(line.command, Command::kSubmit);
   EXPECT_EQ(line.server, "bakery:7419");
   EXPECT_EQ(line.scene, "scene.glb");
-  EXPECT_EQ(line.output, "out");
+  EXPECT_EQ(line.folder, "out");
   EXPECT_EQ(line.bake.atlas_size, 256u);
+  EXPECT_EQ(line.bake.texels_per_meter, 12.5);
+  EXPECT_EQ(line.bake.lightmap_uv, v1::LIGHTMAP_UV_UNWRAP);
+  EXPECT_EQ(line.bake.output, v1::OUTPUT_BOTH);
+  EXPECT_THAT(line.files.encodings, testing::ElementsAre(Encoding::kRgbmPng, Encoding::kExr));
+  EXPECT_TRUE(line.files.vertex_colors);
   EXPECT_EQ(line.bake.sky, (Vec3{1, 2, 3.5}));
   ASSERT_TRUE(line.bake.sun.has_value());
   EXPECT_EQ(line.bake.sun->direction, (Vec3{0, -1, 0}));
@@ -83,6 +97,9 @@ TEST_F(Options, LeavesToTheServerWhatIsNotChosen) {
   EXPECT_EQ(bake.max_patches, 0u);
   EXPECT_EQ(bake.threads, 0u);
   EXPECT_EQ(bake.max_reflectance, 0.98);
+  EXPECT_EQ(bake.texels_per_meter, 32);
+  EXPECT_EQ(bake.lightmap_uv, v1::LIGHTMAP_UV_AUTO);
+  EXPECT_EQ(bake.output, v1::OUTPUT_LIGHTMAP);
   EXPECT_FALSE(bake.sky.has_value());
   EXPECT_FALSE(bake.sun.has_value());
 }
@@ -146,6 +163,13 @@ INSTANTIATE_TEST_SUITE_P(
         BadOption{{"--sky", "1,1e999,3"}, "'1e999'"}, BadOption{{"--sky", ""}, "R,G,B"},
         BadOption{{"--sun", "0,0,0:1,1,1"}, "0,0,0 is zero"}, BadOption{{"--sun", "0,-1,0"}, "DX,DY,DZ:R,G,B"},
         BadOption{{"--sun", "0,-1,0:1,1,-1"}, "below 0"}, BadOption{{"--sun", "0,inf,0:1,1,1"}, "'inf' is not finite"},
+        BadOption{{"--lightmap-uv", "mine"}, "'mine' is none of auto, keep, unwrap"},
+        BadOption{{"--output", "picture"}, "'picture' is none of both, lightmap, vertices"},
+        BadOption{{"--encoding", "exr,jpg"}, "'jpg' is none of exr, hdr, png-rgbm"},
+        BadOption{{"--encoding", ""}, "'' is none of"}, BadOption{{"--encoding", "exr,"}, "'' is none of"},
+        BadOption{{"--texels-per-meter", "0"}, "'0' is not a number from 0.001"},
+        BadOption{{"--texels-per-meter", "nan"}, "'nan'"}, BadOption{{"--texels-per-meter", "1e9"}, "'1e9'"},
+        BadOption{{"--vertex-colors"}, "--output vertices"},
         BadOption{{"--rays", "0"}, "'0' is not a whole number from 1"}, BadOption{{"--rays", "1.5"}, "'1.5'"},
         BadOption{{"--rays", "-5"}, "'-5'"}, BadOption{{"--rays", "99999999999999999999999"}, "999"},
         BadOption{{"--max-patches", "0"}, "'0'"}, BadOption{{"--max-patches", "many"}, "'many'"},
@@ -158,8 +182,25 @@ TEST_F(Options, NamesWhatIsMissing) {
   EXPECT_EQ(refused({}).code, kUsage);
   EXPECT_EQ(refused({"frobnicate"}).code, kUsage);
   EXPECT_THAT(refused({"submit", "-o", "out"}).err, HasSubstr("SCENE"));
-  EXPECT_THAT(refused({"submit", "scene.glb"}).err, HasSubstr("--output"));
+  EXPECT_THAT(refused({"submit", "scene.glb"}).err, HasSubstr("--out"));
   EXPECT_THAT(refused({"watch", "--server", "s"}).err, HasSubstr("JOB"));
+}
+
+TEST_F(Options, TakesTheSceneOfADownload) {
+  const CommandLine line = accepted(
+      {"download", "3f", "-o", "out", "--server", "s", "--scene", "room.glb", "--encoding", "hdr", "--vertex-colors"});
+  EXPECT_EQ(line.scene, "room.glb");
+  EXPECT_THAT(line.files.encodings, testing::ElementsAre(Encoding::kHdr));
+  EXPECT_TRUE(line.files.vertex_colors);
+  EXPECT_TRUE(accepted({"download", "3f", "-o", "out", "--server", "s"}).scene.empty());
+}
+
+TEST_F(Options, SubmitNamesEveryFileThatItWrites) {
+  const std::string help = refused({"submit", "--help"}).out;
+  for (const char* word : {"scene.glb", "lightmap_N.exr", "lightmap_N.png", "lightmaps.json", "report.json",
+                           "MOZ_lightmap", "_IRRADIANCE", "radbake_texel_density"}) {
+    EXPECT_THAT(help, HasSubstr(word));
+  }
 }
 
 TEST_F(Options, HelpsEverywhereWithExamples) {

@@ -1,4 +1,5 @@
 """Has headless Chromium draw a .glb with three.js: the page, its packages and the scene come from a server of our own."""
+import contextlib
 import http.server
 import os
 import pathlib
@@ -8,6 +9,7 @@ import signal
 import subprocess
 import tempfile
 import threading
+import time
 import urllib.parse
 
 HERE = pathlib.Path(__file__).parent
@@ -48,6 +50,17 @@ def handler_for(scene, packages, answers):
     return Handler
 
 
+def wait_for_answer(answers, browser):
+    """Raises queue.Empty after the limit, or when the browser has ended without an answer."""
+    end = time.monotonic() + LIMIT_SECONDS
+    while True:
+        try:
+            return answers.get(timeout=1)
+        except queue.Empty:
+            if browser.poll() is not None or time.monotonic() > end:
+                raise
+
+
 def draw(scene, packages, **view):
     """A PNG's bytes. `view`: the parameters of view.js. WebGL runs on the CPU: any machine draws the same."""
     answers = queue.Queue()
@@ -65,12 +78,13 @@ def draw(scene, packages, **view):
             browser = subprocess.Popen([find_chromium(), *options, address], stdin=subprocess.DEVNULL, stdout=log,
                                        stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, "HOME": profile})
             try:
-                kind, body = answers.get(timeout=LIMIT_SECONDS)
+                kind, body = wait_for_answer(answers, browser)
             except queue.Empty:
                 log.seek(0)
                 raise RuntimeError(f"the browser drew nothing: {log.read()[-4000:]}") from None
             finally:
-                os.killpg(browser.pid, signal.SIGKILL)
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(browser.pid, signal.SIGKILL)
                 browser.wait()
                 server.shutdown()
                 server.server_close()

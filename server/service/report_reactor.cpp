@@ -79,6 +79,7 @@ grpc::Status ReportReactor::take_report() {
     case v1::WorkerReport::kBakeFinished: {
       std::vector<Digest> blobs;
       for (const v1::Layer& layer : report_.bake_finished().layers()) blobs.push_back(from_message(layer.blob()));
+      if (report_.bake_finished().has_mesh_data()) blobs.push_back(from_message(report_.bake_finished().mesh_data()));
       run_->report_outcome({Outcome::Kind::kSucceeded, report_.bake_finished().SerializeAsString(), {}}, blobs);
       break;
     }

@@ -35,6 +35,12 @@ grpc::Status check_settings(const v1::BakeSettings& settings, const v1::RunOptio
     return bad_field("settings.max_patches", std::to_string(settings.max_patches()) + " is above max_patches " +
                                                  std::to_string(limits.max_patches));
   }
+  if (!v1::LightmapUv_IsValid(settings.lightmap_uv())) {
+    return bad_field("settings.lightmap_uv", std::to_string(settings.lightmap_uv()) + " is not a LightmapUv");
+  }
+  if (!v1::Output_IsValid(settings.output())) {
+    return bad_field("settings.output", std::to_string(settings.output()) + " is not an Output");
+  }
   if (run.threads() > kMaxThreads) {
     return bad_field("run.threads", std::to_string(run.threads()) + " is above " + std::to_string(kMaxThreads));
   }

@@ -78,7 +78,51 @@ v1::LightmapReport to_message(const radiosity::LightmapSummary& lightmap) {
   out.set_num_texels_filled(lightmap.num_texels_filled);
   out.set_num_texels_dilated(lightmap.num_texels_dilated);
   out.set_texels_per_meter(lightmap.texels_per_meter);
+  out.set_atlas_height(static_cast<std::uint32_t>(lightmap.atlas_height));
+  out.set_num_lightmaps(static_cast<std::uint32_t>(lightmap.num_lightmaps));
+  out.set_fill(lightmap.fill);
+  out.set_num_meshes_kept(lightmap.num_meshes_kept);
+  out.set_num_meshes_placed(lightmap.num_meshes_placed);
+  out.set_num_meshes_unwrapped(lightmap.num_meshes_unwrapped);
+  out.set_num_charts(lightmap.num_charts);
+  out.set_max_stretch(lightmap.max_stretch);
+  out.set_num_seam_samples(lightmap.num_seam_samples);
+  out.set_seam_difference_before(lightmap.seam_difference_before);
+  out.set_seam_difference(lightmap.seam_difference);
   return out;
+}
+
+v1::VertexReport to_message(const radiosity::VertexSummary& vertices) {
+  v1::VertexReport out;
+  out.set_num_groups(vertices.num_groups);
+  out.set_num_groups_filled(vertices.num_groups_filled);
+  out.set_num_copies(vertices.num_copies);
+  return out;
+}
+
+v1::UvSource to_source(radiosity::UvSource source) {
+  switch (source) {
+    case radiosity::UvSource::kNone: return v1::UV_NONE;
+    case radiosity::UvSource::kKept: return v1::UV_KEPT;
+    case radiosity::UvSource::kPlaced: return v1::UV_PLACED;
+    case radiosity::UvSource::kUnwrapped: return v1::UV_UNWRAPPED;
+  }
+  return v1::UV_NONE;
+}
+
+radiosity::LightmapUv to_lightmap_uv(v1::LightmapUv uv) {
+  if (uv == v1::LIGHTMAP_UV_KEEP) return radiosity::LightmapUv::kKeep;
+  return uv == v1::LIGHTMAP_UV_UNWRAP ? radiosity::LightmapUv::kUnwrap : radiosity::LightmapUv::kAuto;
+}
+
+radiosity::Output to_output(v1::Output output) {
+  if (output == v1::OUTPUT_VERTICES) return radiosity::Output::kVertices;
+  return output == v1::OUTPUT_BOTH ? radiosity::Output::kBoth : radiosity::Output::kLightmap;
+}
+
+template <typename T>
+void append(const std::vector<T>& values, std::string& data) {
+  data.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
 v1::BakeState to_state(radiosity::BakeStage stage) {
@@ -100,6 +144,8 @@ radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::Ru
   options.rays = static_cast<int>(settings.rays());
   options.max_patches = static_cast<int>(settings.max_patches());
   options.seed = settings.seed();
+  options.lightmap_uv = to_lightmap_uv(settings.lightmap_uv());
+  options.output = to_output(settings.output());
   options.threads = static_cast<int>(run.threads());
   return options;
 }
@@ -108,7 +154,10 @@ v1::Plan to_message(const radiosity::BakePlan& plan) {
   v1::Plan out;
   *out.mutable_survey() = to_message(plan.survey);
   out.set_atlas_size(static_cast<std::uint32_t>(plan.atlas_size));
+  out.set_atlas_height(static_cast<std::uint32_t>(plan.atlas_height));
+  out.set_num_lightmaps(static_cast<std::uint32_t>(plan.num_lightmaps));
   out.set_num_texels(plan.num_texels);
+  out.set_num_vertex_groups(plan.num_vertex_groups);
   out.set_num_patches(plan.num_patches);
   out.set_rays_per_texel(static_cast<std::uint64_t>(plan.rays_per_texel));
   out.set_rays_per_row(static_cast<std::uint64_t>(plan.rays_per_row));
@@ -159,6 +208,26 @@ v1::Layer to_message(const radiosity::Layer& layer) {
   return out;
 }
 
+v1::MeshResult to_message(const radiosity::MeshOutput& mesh, std::string& data) {
+  v1::MeshResult out;
+  out.set_lightmap(static_cast<std::uint32_t>(mesh.placement.sheet));
+  out.set_uv_source(to_source(mesh.placement.source));
+  out.mutable_uv_scale()->set_x(mesh.placement.scale.x);
+  out.mutable_uv_scale()->set_y(mesh.placement.scale.y);
+  out.mutable_uv_offset()->set_x(mesh.placement.offset.x);
+  out.mutable_uv_offset()->set_y(mesh.placement.offset.y);
+  out.set_is_split(!mesh.source_vertices.empty());
+  out.set_has_irradiance(!mesh.irradiance.empty());
+  out.set_num_vertices(mesh.num_vertices);
+  out.set_num_triangles(static_cast<std::uint32_t>(mesh.triangles.size()));
+  out.set_data_offset(data.size());
+  append(mesh.source_vertices, data);
+  append(mesh.triangles, data);
+  append(mesh.uvs, data);
+  append(mesh.irradiance, data);
+  return out;
+}
+
 v1::BakeReport to_message(const radiosity::BakeReport& report) {
   v1::BakeReport out;
   out.set_instruction_set(report.instruction_set);
@@ -171,6 +240,7 @@ v1::BakeReport to_message(const radiosity::BakeReport& report) {
   *out.mutable_energy() = to_message(report.energy);
   *out.mutable_transport() = to_message(report.transport);
   *out.mutable_lightmap() = to_message(report.lightmap);
+  *out.mutable_vertices() = to_message(report.vertices);
   for (const Warning& warning : report.warnings) *out.add_warnings() = to_message(warning);
   return out;
 }

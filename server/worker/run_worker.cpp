@@ -70,26 +70,25 @@ std::uint64_t chunk_bytes_of(const v1::Limits& limits) {
 
 Error server_gone() { return {ErrorCode::kUnavailable, "the server is gone"}; }
 
-/// Sends a layer's plane in parts, and returns the layer with its blob named.
-Result<v1::Layer> send_layer(const radiosity::Layer& layer, std::uint64_t chunk_bytes, ReportStream& stream,
-                             const std::function<void(std::uint64_t)>& on_sent) {
-  const auto bytes = std::as_bytes(std::span(layer.values));
+/// Sends a blob in parts, and returns its digest.
+Result<v1::Digest> send_blob(const std::string& name, std::span<const std::byte> bytes, std::uint64_t chunk_bytes,
+                             ReportStream& stream, const std::function<void(std::uint64_t)>& on_sent) {
   const Digest digest = digest_of(bytes);
-  v1::Layer message = to_message(layer);
-  message.mutable_blob()->set_sha256(digest.sha256);
-  message.mutable_blob()->set_size_bytes(digest.size_bytes);
+  v1::Digest message;
+  message.set_sha256(digest.sha256);
+  message.set_size_bytes(digest.size_bytes);
   std::uint64_t offset = 0;
   do {
     const auto part = bytes.subspan(offset, std::min<std::uint64_t>(chunk_bytes, bytes.size() - offset));
     v1::WorkerReport report;
     v1::ResultBlobChunk& chunk = *report.mutable_chunk();
-    chunk.set_blob(layer.name);
+    chunk.set_blob(name);
     chunk.set_offset(offset);
     chunk.set_data(part.data(), part.size());
     offset += part.size();
     if (offset == bytes.size()) {
       chunk.set_finish(true);
-      *chunk.mutable_digest() = message.blob();
+      *chunk.mutable_digest() = message;
     }
     if (!stream.send(std::move(report))) return server_gone();
     on_sent(part.size());
@@ -97,11 +96,15 @@ Result<v1::Layer> send_layer(const radiosity::Layer& layer, std::uint64_t chunk_
   return message;
 }
 
-/// Sends all layers, under the state WRITING.
-Result<v1::BakeResult> send_layers(const std::vector<radiosity::Layer>& layers, v1::Progress progress,
+/// Sends all layers and the meshes' data, under the state WRITING.
+Result<v1::BakeResult> send_result(const radiosity::BakeOutcome& outcome, v1::Progress progress,
                                    std::uint64_t chunk_bytes, ReportStream& stream) {
-  std::uint64_t total = 0, sent = 0;
-  for (const radiosity::Layer& layer : layers) total += layer.values.size() * sizeof(float);
+  v1::BakeResult result;
+  std::string mesh_data;
+  for (const radiosity::MeshOutput& mesh : outcome.meshes) *result.add_meshes() = to_message(mesh, mesh_data);
+
+  std::uint64_t total = mesh_data.size(), sent = 0;
+  for (const radiosity::Layer& layer : outcome.layers) total += layer.values.size() * sizeof(float);
   const auto report_sent = [&](std::uint64_t bytes) {
     sent += bytes;
     progress.set_state(v1::WRITING);
@@ -110,9 +113,15 @@ Result<v1::BakeResult> send_layers(const std::vector<radiosity::Layer>& layers, 
     stream.set_progress(progress);
   };
   report_sent(0);
-  v1::BakeResult result;
-  for (const radiosity::Layer& layer : layers) {
-    RADBAKE_ASSIGN_OR_RETURN(*result.add_layers(), send_layer(layer, chunk_bytes, stream, report_sent));
+  for (const radiosity::Layer& layer : outcome.layers) {
+    v1::Layer& message = *result.add_layers();
+    message = to_message(layer);
+    RADBAKE_ASSIGN_OR_RETURN(*message.mutable_blob(), send_blob(layer.name, std::as_bytes(std::span(layer.values)),
+                                                                chunk_bytes, stream, report_sent));
+  }
+  if (!mesh_data.empty()) {
+    RADBAKE_ASSIGN_OR_RETURN(*result.mutable_mesh_data(), send_blob("mesh_data", std::as_bytes(std::span(mesh_data)),
+                                                                    chunk_bytes, stream, report_sent));
   }
   return result;
 }
@@ -143,7 +152,7 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
 
   after.begin("writing");
   RADBAKE_ASSIGN_OR_RETURN(v1::BakeResult result,
-                           send_layers(outcome.layers, observer.latest(), chunk_bytes_of(start.limits()), stream));
+                           send_result(outcome, observer.latest(), chunk_bytes_of(start.limits()), stream));
   after.end();
 
   // Complete the report with what the library does not know.

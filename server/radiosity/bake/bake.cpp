@@ -12,6 +12,8 @@
 #include "server/radiosity/error/energy.h"
 #include "server/radiosity/form_factor/patch_rows.h"
 #include "server/radiosity/gather/gather.h"
+#include "server/radiosity/gather/gather_vertices.h"
+#include "server/radiosity/lightmap/level_seams.h"
 #include "server/radiosity/solve/solve.h"
 #include "server/radiosity/transport/sparse_operator.h"
 
@@ -97,8 +99,9 @@ class Bake {
     RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> radiosity, solve(rows, patch_direct.emitted_lumens()));
     rows = {};
 
-    const DirectLight texel_direct(surfaces_, visibility, kLightSamplesPerTexel);
-    if (!gather(estimator, texel_direct, radiosity)) return cancelled();
+    const DirectLight receiver_direct(surfaces_, visibility, kLightSamplesPerTexel);
+    const GatherScene scene{surfaces_, visibility, estimator, receiver_direct, radiosity, scene_.sky, options_.seed};
+    if (!gather(scene)) return cancelled();
     outcome_.report.stages = progress_.stage_times();
     return std::move(outcome_);
   }
@@ -151,30 +154,93 @@ class Bake {
     return radiosity;
   }
 
-  /// Radiosity -> lightmap; false when it was stopped.
-  bool gather(const HemisphereEstimator& estimator, const DirectLight& direct, std::span<const Vec3> radiosity) {
+  /// Radiosity -> lightmaps and light by vertex; false when it was stopped.
+  bool gather(const GatherScene& scene) {
+    const std::uint64_t num_receivers = prepared_.plan.num_texels + prepared_.plan.num_vertex_groups;
+    progress_.report(BakeStage::kGathering, 0, num_receivers);
+    if (prepared_.atlas && !gather_texels(scene, *prepared_.atlas, num_receivers)) return false;
+    GatheredVertices vertices;
+    if (prepared_.groups) {
+      vertices = gather_vertices(
+          scene, *prepared_.groups,
+          [&](std::uint64_t done) {
+            progress_.report(BakeStage::kGathering, prepared_.plan.num_texels + done, num_receivers);
+          },
+          stop_);
+      if (vertices.is_cancelled) return false;
+    }
+    describe_meshes(vertices);
+    return true;
+  }
+
+  bool gather_texels(const GatherScene& scene, const Atlas& atlas, std::uint64_t num_receivers) {
     BakeReport& report = outcome_.report;
-    const std::uint64_t num_texels = prepared_.plan.num_texels;
-    progress_.report(BakeStage::kGathering, 0, num_texels);
-    const GatherScene scene{surfaces_, prepared_.atlas, estimator, direct, radiosity, scene_.sky, options_.seed};
     GatheredMap map = gather_lightmap(
-        scene,
+        scene, atlas,
         [&](const GatheredTile& tile) {
-          progress_.tile({0, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba, "lightmap_0",
-                          prepared_.atlas.size(), prepared_.atlas.size()});
-          progress_.report(BakeStage::kGathering, tile.texels_done, num_texels);
+          progress_.tile({tile.sheet, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba, layer_name(tile.sheet),
+                          atlas.width(), atlas.height()});
+          progress_.report(BakeStage::kGathering, tile.texels_done, num_receivers);
         },
         stop_);
     if (map.is_cancelled) return false;
-    report.num_gather_rays = map.num_rays;
+    report.num_gather_rays += map.num_rays;
     report.num_light_rays += map.num_light_rays;
     report.energy.mean_irradiance = map.mean_irradiance;
 
-    const int size = prepared_.atlas.size();
-    const FillCounts counts = fill_from_neighbours(map.states, size, kPadding, map.rgba);
-    report.lightmap = {size, num_texels, counts.num_filled, counts.num_dilated, prepared_.atlas.texels_per_meter()};
-    outcome_.layers.push_back({"lightmap_0", "irradiance", "lx", size, size, 4, std::move(map.rgba)});
+    LightmapSummary& summary = report.lightmap;
+    const auto sheet_texels = static_cast<std::size_t>(atlas.width()) * atlas.height();
+    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
+      const std::size_t first = sheet_texels * static_cast<std::size_t>(sheet);
+      std::span<float> rgba = std::span(map.rgba).subspan(4 * first, 4 * sheet_texels);
+      const FillCounts counts =
+          fill_from_neighbours(std::span(map.states).subspan(first, sheet_texels), atlas.width(), kPadding, rgba);
+      summary.num_texels_filled += counts.num_filled;
+      summary.num_texels_dilated += counts.num_dilated;
+    }
+    const SeamReport seams = level_seams(surfaces_, atlas.layout(), map.states, map.rgba);
+    summary.num_seam_samples = seams.num_samples;
+    summary.seam_difference_before = seams.difference_before;
+    summary.seam_difference = seams.difference;
+    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
+      const auto first = map.rgba.begin() + static_cast<std::ptrdiff_t>(4 * sheet_texels) * sheet;
+      outcome_.layers.push_back({layer_name(sheet), "irradiance", "lx", atlas.width(), atlas.height(), 4,
+                                 std::vector<float>(first, first + static_cast<std::ptrdiff_t>(4 * sheet_texels))});
+    }
+    summary.atlas_size = atlas.width();
+    summary.atlas_height = atlas.height();
+    summary.num_lightmaps = atlas.num_sheets();
+    summary.num_texels = atlas.num_texels();
+    summary.texels_per_meter = atlas.texels_per_meter();
+    summary.fill = atlas.fill();
+    summary.num_charts = atlas.layout().num_charts;
+    summary.max_stretch = atlas.layout().max_stretch;
+    for (const MeshPlacement& mesh : atlas.layout().meshes) {
+      summary.num_meshes_kept += mesh.source == UvSource::kKept;
+      summary.num_meshes_placed += mesh.source == UvSource::kPlaced;
+      summary.num_meshes_unwrapped += mesh.source == UvSource::kUnwrapped;
+    }
     return true;
+  }
+
+  static std::string layer_name(int sheet) { return "lightmap_" + std::to_string(sheet); }
+
+  void describe_meshes(const GatheredVertices& vertices) {
+    BakeReport& report = outcome_.report;
+    const Layout* layout = prepared_.atlas ? &prepared_.atlas->layout() : nullptr;
+    std::optional<VertexLight> light;
+    if (prepared_.groups) {
+      light.emplace(VertexLight{*prepared_.groups, vertices.irradiance});
+      report.num_gather_rays += vertices.num_rays;
+      report.num_light_rays += vertices.num_light_rays;
+      report.vertices.num_groups = prepared_.groups->size();
+      report.vertices.num_groups_filled = vertices.num_filled;
+      if (!prepared_.atlas) report.energy.mean_irradiance = vertices.mean_irradiance;
+    }
+    outcome_.meshes = make_mesh_outputs(surfaces_, layout, light ? &*light : nullptr);
+    for (std::size_t m = 0; m < outcome_.meshes.size(); ++m) {
+      report.vertices.num_copies += outcome_.meshes[m].num_vertices - scene_.meshes[m].positions.size();
+    }
   }
 
   const Scene& scene_;
@@ -191,7 +257,8 @@ double row_rays(const BakePlan& plan, const Patches& patches) {
   return static_cast<double>(patches.num_cells()) * (plan.rays_per_row + kLightSamplesPerPatch);
 }
 double gather_rays(const BakePlan& plan) {
-  return static_cast<double>(plan.num_texels) * (plan.rays_per_texel + plan.light_samples_per_texel);
+  return static_cast<double>(plan.num_texels + plan.num_vertex_groups) *
+         (plan.rays_per_texel + plan.light_samples_per_texel);
 }
 
 }  // namespace

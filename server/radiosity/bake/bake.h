@@ -7,6 +7,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene.h"
+#include "server/radiosity/gather/mesh_output.h"
 #include "server/radiosity/plan/plan.h"
 
 namespace radbake::radiosity {
@@ -70,6 +71,17 @@ struct LightmapSummary {
   int atlas_size = 0;
   std::uint64_t num_texels = 0, num_texels_filled = 0, num_texels_dilated = 0;
   double texels_per_meter = 0;
+  int atlas_height = 0, num_lightmaps = 0;
+  double fill = 0;
+  std::uint64_t num_meshes_kept = 0, num_meshes_placed = 0, num_meshes_unwrapped = 0, num_charts = 0;
+  double max_stretch = 0;
+  std::uint64_t num_seam_samples = 0;
+  double seam_difference_before = 0, seam_difference = 0;
+};
+
+/// Field for field radbake.v1.VertexReport, where the fields are explained.
+struct VertexSummary {
+  std::uint64_t num_groups = 0, num_groups_filled = 0, num_copies = 0;
 };
 
 struct StageTime {
@@ -86,12 +98,14 @@ struct BakeReport {
   EnergyAudit energy;
   TransportSummary transport;
   LightmapSummary lightmap;
+  VertexSummary vertices;
   std::vector<Warning> warnings;
   std::vector<StageTime> stages;
 };
 
 struct BakeOutcome {
   std::vector<Layer> layers;
+  std::vector<MeshOutput> meshes;  ///< [scene meshes]
   BakeReport report;
 };
 

@@ -14,8 +14,14 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   if (stop.stop_requested()) return cancelled;
 
   const double density = options.texels_per_meter > 0 ? options.texels_per_meter : kDefaultTexelsPerMeter;
-  const int atlas_size = options.atlas_size > 0 ? options.atlas_size : atlas_size_for_density(surfaces, density);
-  RADBAKE_ASSIGN_OR_RETURN(prepared->atlas, Atlas::make(surfaces, atlas_size));
+  std::vector<Warning> layout_warnings;
+  if (options.output != Output::kVertices) {
+    const LayoutOptions wanted{options.lightmap_uv, options.atlas_size, density, options.texels_per_meter == 0};
+    RADBAKE_ASSIGN_OR_RETURN(Layout layout, make_layout(surfaces, wanted));
+    layout_warnings = std::move(layout.warnings);
+    RADBAKE_ASSIGN_OR_RETURN(prepared->atlas, Atlas::make(surfaces, std::move(layout)));
+  }
+  if (options.output != Output::kLightmap) prepared->groups = group_vertices(surfaces);
   if (stop.stop_requested()) return cancelled;
 
   double area = 0;
@@ -23,7 +29,8 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
     area += surfaces.areas[t] * (surfaces.material(t).is_double_sided ? 2 : 1);
   }
   const auto max_patches = static_cast<std::size_t>(options.max_patches > 0 ? options.max_patches : kDefaultMaxPatches);
-  const double texel_edge = 1 / (prepared->atlas.texels_per_meter() * surfaces.metres_per_unit);
+  const double reached_density = prepared->atlas ? prepared->atlas->texels_per_meter() : density;
+  const double texel_edge = 1 / (reached_density * surfaces.metres_per_unit);
   prepared->visibility = make_embree_visibility(surfaces.corners);
   if (stop.stop_requested()) return cancelled;
   prepared->patches =
@@ -32,8 +39,13 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
 
   BakePlan& plan = prepared->plan;
   plan.survey = prepared->surveyed.survey;
-  plan.atlas_size = atlas_size;
-  plan.num_texels = prepared->atlas.num_texels();
+  if (prepared->atlas) {
+    plan.atlas_size = prepared->atlas->width();
+    plan.atlas_height = prepared->atlas->height();
+    plan.num_lightmaps = prepared->atlas->num_sheets();
+    plan.num_texels = prepared->atlas->num_texels();
+  }
+  if (prepared->groups) plan.num_vertex_groups = prepared->groups->size();
   plan.num_patches = prepared->patches.size();
   plan.rays_per_texel = options.rays > 0 ? options.rays : kDefaultRays;
   plan.rays_per_row = plan.rays_per_texel;
@@ -41,8 +53,9 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.estimator = "hemisphere";
   plan.transport = "sparse";
   plan.solver = "gauss-seidel";
-  plan.texels_per_meter = prepared->atlas.texels_per_meter();
+  plan.texels_per_meter = reached_density;
   plan.warnings = prepared->surveyed.warnings;
+  plan.warnings.insert(plan.warnings.end(), layout_warnings.begin(), layout_warnings.end());
   if (prepared->patches.num_uncut() > 0) {
     plan.warnings.push_back({"contacts_not_cut", std::to_string(prepared->patches.num_uncut()) +
                                                      " patches reach across surfaces that stand on them: more would "

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "common/base/result.h"
+#include "server/radiosity/gather/vertex_groups.h"
 #include "server/radiosity/lightmap/atlas.h"
 #include "server/radiosity/patches/patches.h"
 #include "server/radiosity/plan/plan.h"
@@ -16,7 +18,8 @@ namespace radbake::radiosity {
 struct Preparation {
   SurveyedScene surveyed;
   std::unique_ptr<Visibility> visibility;
-  Atlas atlas;
+  std::optional<Atlas> atlas;          ///< where lightmaps are wanted
+  std::optional<VertexGroups> groups;  ///< where light by vertex is wanted
   Patches patches;
   BakePlan plan;
 };

@@ -34,9 +34,10 @@ int HemisphereEstimator::num_sites() const {
 
 void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch,
                                      RowSample& row) const {
-  row = {std::move(row.arrivals), 0, 0, 0, 0, std::move(row.is_buried), 1};
+  row = {std::move(row.arrivals), 0, 0, 0, 0, std::move(row.is_buried), std::move(row.of_site), 1};
   row.arrivals.clear();
   row.is_buried.assign(sites.size(), 0);
+  row.of_site.assign(sites.size(), {});
   scratch.rays.clear();
   scratch.site_of_ray.clear();
 
@@ -67,18 +68,20 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
   std::size_t num_buried = 0;
   for (std::size_t first = 0; first < scratch.rays.size();) {
     const std::uint32_t s = scratch.site_of_ray[first];
-    const std::size_t arrivals_before = row.arrivals.size();
-    std::uint32_t escaped = 0, absorbed = 0;
+    RowSample::SiteRays own;
+    own.first_arrival = static_cast<std::uint32_t>(row.arrivals.size());
+    std::uint32_t absorbed = 0;
     std::size_t k = first;
     for (; k < scratch.rays.size() && scratch.site_of_ray[k] == s; ++k) {
       const Hit& hit = scratch.hits[k];
       if (hit.triangle == kNoHit) {
-        ++escaped;
+        ++own.escaped;
         continue;
       }
       const auto& d = scratch.rays[k].direction;
-      const bool is_back = dot(surfaces_.normals[hit.triangle], Vec3{d[0], d[1], d[2]}) > 0;
-      const std::uint32_t patch = patches_.find(hit.triangle, hit.u, hit.v, is_back);
+      const Vec3 direction{d[0], d[1], d[2]};
+      own.backs += dot(surfaces_.normals[hit.triangle], direction) > 0;
+      const std::uint32_t patch = patches_.met_by(hit, direction, surfaces_);
       if (patch == kNoPatch) {
         ++absorbed;
       } else {
@@ -88,11 +91,14 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
     if (2 * std::size_t{absorbed} > k - first) {
       row.is_buried[s] = 1;
       ++num_buried;
-      row.arrivals.resize(arrivals_before);
+      row.arrivals.resize(own.first_arrival);
     } else {
-      row.escaped += escaped;
+      own.num_arrivals = static_cast<std::uint32_t>(row.arrivals.size()) - own.first_arrival;
+      own.counted = static_cast<std::uint32_t>(k - first);
+      row.of_site[s] = own;
+      row.escaped += own.escaped;
       row.absorbed += absorbed;
-      row.counted += static_cast<std::uint32_t>(k - first);
+      row.counted += own.counted;
     }
     first = k;
   }

@@ -13,12 +13,20 @@ namespace radbake::radiosity {
 
 /// Where the rays of one row went. arrivals.size() + escaped + absorbed = counted.
 struct RowSample {
+  /// Of one site's rays; none where it is buried.
+  struct SiteRays {
+    std::uint32_t first_arrival = 0, num_arrivals = 0;
+    std::uint32_t escaped = 0;
+    std::uint32_t counted = 0;
+    std::uint32_t backs = 0;  ///< rays that met a back, of single- or double-sided surfaces
+  };
   std::vector<std::uint32_t> arrivals;  ///< patch of each ray that met one, in the order of the rays
   std::uint32_t escaped = 0;            ///< rays that met nothing: the row's share of the sky
   std::uint32_t absorbed = 0;           ///< rays that met the back of a single-sided surface
   std::uint32_t counted = 0;            ///< rays from sites that are not buried
   std::uint32_t traced = 0;
   std::vector<std::uint8_t> is_buried;  ///< [sites]
+  std::vector<SiteRays> of_site;        ///< [sites]
   double visible_share = 1;             ///< of the sites: those not buried
 };
 

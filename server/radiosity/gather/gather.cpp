@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <mutex>
-#include <numbers>
 
 #include "server/radiosity/threads/for_each_range.h"
 
@@ -19,10 +18,7 @@ constexpr int kLargeAtlas = 1024;
 /// Buffers of one thread.
 struct Scratch {
   Footprint footprint;
-  std::vector<Site> sites;
-  HemisphereEstimator::Scratch hemisphere;
-  DirectLight::Scratch light;
-  RowSample row;
+  ReceiveScratch receive;
 };
 
 struct Texel {
@@ -33,78 +29,69 @@ struct Texel {
   std::uint64_t rays = 0, light_rays = 0;
 };
 
-Texel gather_texel(const GatherScene& scene, const SobolPoints& site_points, int x, int y, Scratch& scratch) {
+Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoints& site_points, int x, int y,
+                   Scratch& scratch) {
   Texel texel;
-  scene.atlas.footprint(x, y, scratch.footprint);
+  atlas.footprint(x, y, scratch.footprint);
   if (scratch.footprint.is_empty()) return texel;
   texel.coverage = scratch.footprint.coverage;
   texel.area = scratch.footprint.area();
-  const std::uint64_t id = static_cast<std::uint64_t>(y) * scene.atlas.size() + x;
+  const std::uint64_t id = static_cast<std::uint64_t>(y) * atlas.width() + x;
 
   // Spread the sites over the footprint.
   const auto seeds = SobolPoints::seeds_of(seed_of(scene.seed, kSitesOfTexel, id));
-  scratch.sites.clear();
+  scratch.receive.sites.clear();
   for (int s = 0; s < site_points.size(); ++s) {
     const SurfacePoint p =
         scratch.footprint.sample(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds));
-    scratch.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
+    scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
   }
-
-  // Gather what the patches reflect, and the sky.
-  scene.rows.sample_row(scratch.sites, seed_of(scene.seed, kRaysOfTexel, id), scratch.hemisphere, scratch.row);
-  texel.rays = scratch.row.traced;
-  constexpr double kMinVisibleShare = 0.5;
-  if (scratch.row.visible_share < kMinVisibleShare || scratch.row.counted == 0) {
-    texel.state = TexelState::kBuried;
-    return texel;
-  }
-  Vec3 sum = scene.sky * (std::numbers::pi * scratch.row.escaped);
-  for (const std::uint32_t patch : scratch.row.arrivals) sum += scene.radiosity[patch];
-  texel.irradiance = sum / scratch.row.counted;
-
-  // Add what the lights send straight.
-  Vec3 direct;
-  texel.light_rays = scene.direct.estimate(scratch.sites, scratch.row.is_buried, seed_of(scene.seed, kLightOfTexel, id),
-                                           scratch.light, std::span(&direct, 1));
-  texel.irradiance += direct;
-  texel.state = TexelState::kValid;
+  const Reception reception =
+      receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
+  texel.irradiance = reception.irradiance;
+  texel.state = reception.is_buried ? TexelState::kBuried : TexelState::kValid;
+  texel.rays = reception.rays;
+  texel.light_rays = reception.light_rays;
   return texel;
 }
 
 }  // namespace
 
-GatheredMap gather_lightmap(const GatherScene& scene, const std::function<void(const GatheredTile&)>& on_tile,
-                            std::stop_token stop) {
-  const int size = scene.atlas.size();
-  const int edge = size > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
-  const int tiles = (size + edge - 1) / edge;
+GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas,
+                            const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop) {
+  const int width = atlas.width(), height = atlas.height();
+  const int edge = std::max(width, height) > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
+  const int tiles_across = (width + edge - 1) / edge, tiles_down = (height + edge - 1) / edge;
+  const std::size_t num_texels = static_cast<std::size_t>(atlas.num_rows()) * width;
   const SobolPoints site_points(scene.rows.num_sites());
 
   GatheredMap map;
-  map.rgba.assign(static_cast<std::size_t>(size) * size * 4, 0.0f);
-  map.states.assign(static_cast<std::size_t>(size) * size, TexelState::kOutside);
+  map.rgba.assign(num_texels * 4, 0.0f);
+  map.states.assign(num_texels, TexelState::kOutside);
   struct TileSums {
     std::uint64_t rays = 0, light_rays = 0;
     double flux = 0, area = 0;
   };
-  std::vector<TileSums> sums(static_cast<std::size_t>(tiles) * tiles);
+  std::vector<TileSums> sums(static_cast<std::size_t>(tiles_across) * tiles_down * atlas.num_sheets());
   std::mutex report_mutex;
   std::uint64_t texels_done = 0;
 
   const auto gather_tile = [&](int index) {
     Scratch scratch;
     GatheredTile tile;
-    tile.x = index % tiles * edge;
-    tile.y = index / tiles * edge;
-    tile.width = std::min(edge, size - tile.x);
-    tile.height = std::min(edge, size - tile.y);
+    tile.sheet = index / (tiles_across * tiles_down);
+    tile.x = index % tiles_across * edge;
+    tile.y = index / tiles_across % tiles_down * edge;
+    tile.width = std::min(edge, width - tile.x);
+    tile.height = std::min(edge, height - tile.y);
+    const int first_row = tile.sheet * height + tile.y;
     TileSums& own = sums[index];
     std::uint64_t texels = 0;
-    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+    for (int y = first_row; y < first_row + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         if (stop.stop_requested()) return;
-        const Texel texel = gather_texel(scene, site_points, x, y, scratch);
-        const std::size_t at = static_cast<std::size_t>(y) * size + x;
+        const Texel texel = gather_texel(scene, atlas, site_points, x, y, scratch);
+        const std::size_t at = static_cast<std::size_t>(y) * width + x;
         map.states[at] = texel.state;
         for (int c = 0; c < 3; ++c) map.rgba[4 * at + c] = static_cast<float>(texel.irradiance[c]);
         map.rgba[4 * at + 3] = static_cast<float>(texel.coverage);
@@ -116,8 +103,8 @@ GatheredMap gather_lightmap(const GatherScene& scene, const std::function<void(c
           own.flux += texel.area * mean_component(texel.irradiance);
         }
       }
-      tile.rgba.insert(tile.rgba.end(), map.rgba.begin() + 4 * (static_cast<std::ptrdiff_t>(y) * size + tile.x),
-                       map.rgba.begin() + 4 * (static_cast<std::ptrdiff_t>(y) * size + tile.x + tile.width));
+      tile.rgba.insert(tile.rgba.end(), map.rgba.begin() + 4 * (static_cast<std::ptrdiff_t>(y) * width + tile.x),
+                       map.rgba.begin() + 4 * (static_cast<std::ptrdiff_t>(y) * width + tile.x + tile.width));
     }
     const std::scoped_lock lock(report_mutex);
     texels_done += texels;

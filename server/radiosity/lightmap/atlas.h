@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "common/base/result.h"
+#include "server/radiosity/lightmap/layout.h"
 #include "server/radiosity/survey/surfaces.h"
 
 namespace radbake::radiosity {
@@ -28,19 +28,24 @@ struct Footprint {
   SurfacePoint sample(double x, double y) const;
 };
 
-/// The lightmap's layout: which triangles lie where, by TEXCOORD_1, row 0 at the top (v = 0).
+/// The lightmaps' texels: which triangles each one covers. Sheets are stacked: row y lies in sheet y / height().
 class Atlas {
  public:
   /// Side of the square blocks that triangles are sorted into, texels.
   static constexpr int kBlock = 8;
 
-  /// Errors: kInvalidArgument naming the mesh: no TEXCOORD_1, coordinates outside 0..1, nothing with an area in the
-  /// atlas, two triangles on one place (then both meshes).
-  static Result<Atlas> make(const Surfaces& surfaces, int size);
+  /// Errors: kInvalidArgument where the layout covers no texel.
+  static Result<Atlas> make(const Surfaces& surfaces, Layout layout);
 
-  int size() const { return size_; }
+  const Layout& layout() const { return layout_; }
+  int width() const { return layout_.width; }
+  int height() const { return layout_.height; }  ///< of a sheet
+  int num_sheets() const { return layout_.num_sheets; }
+  int num_rows() const { return layout_.height * layout_.num_sheets; }
   /// Texels with any coverage.
   std::uint64_t num_texels() const { return num_texels_; }
+  /// Share of all texels' area that is covered.
+  double fill() const { return fill_; }
   /// Median over the triangles, weighted by area.
   double texels_per_meter() const { return texels_per_meter_; }
 
@@ -48,24 +53,18 @@ class Atlas {
   void footprint(int x, int y, Footprint& out) const;
 
  private:
-  Result<void> check_overlap() const;
+  void measure_density();
+  void sort_into_blocks();
   void count_texels();
 
   const Surfaces* surfaces_ = nullptr;
-  int size_ = 0;
-  int blocks_ = 0;  ///< along a side
+  Layout layout_;
+  int blocks_x_ = 0, blocks_y_ = 0;
   std::uint64_t num_texels_ = 0;
+  double fill_ = 0;
   double texels_per_meter_ = 0;
-  std::vector<std::array<Vec2, 3>> corners_;   ///< [triangles], in texels
-  std::vector<std::uint64_t> first_in_block_;  ///< [blocks_^2 + 1]
+  std::vector<std::uint64_t> first_in_block_;  ///< [blocks + 1]
   std::vector<std::uint32_t> in_block_;        ///< triangles, ascending in each block
 };
-
-/// The smallest power of two, 64..4096, that gives at least this many texels a metre (over the whole scene: the root of
-/// the ratio of the areas in the atlas and in the world). Meshes without TEXCOORD_1 do not count.
-int atlas_size_for_density(const Surfaces& surfaces, double texels_per_meter);
-
-/// Lightmap coordinates of a triangle's corners. Precondition: its mesh has them.
-std::array<Vec2, 3> lightmap_corners(const Surfaces& surfaces, std::uint32_t triangle);
 
 }  // namespace radbake::radiosity

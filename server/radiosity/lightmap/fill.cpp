@@ -4,8 +4,9 @@
 
 namespace radbake::radiosity {
 
-FillCounts fill_from_neighbours(std::span<const TexelState> states, int size, int padding, std::vector<float>& rgba) {
+FillCounts fill_from_neighbours(std::span<const TexelState> states, int width, int padding, std::span<float> rgba) {
   FillCounts counts;
+  const int height = static_cast<int>(states.size() / static_cast<std::size_t>(width));
   std::vector<std::uint8_t> is_known(states.size());
   std::vector<std::size_t> open;  // unknown texels, in rows from the top
   for (std::size_t i = 0; i < states.size(); ++i) {
@@ -18,13 +19,13 @@ FillCounts fill_from_neighbours(std::span<const TexelState> states, int size, in
     std::vector<std::array<float, 3>> values;
     for (const std::size_t i : open) {
       if (round >= padding && states[i] == TexelState::kOutside) continue;
-      const int x = static_cast<int>(i % size), y = static_cast<int>(i / size);
+      const int x = static_cast<int>(i % width), y = static_cast<int>(i / width);
       std::array<float, 3> sum{};
       int known = 0;
       for (int ny = y - 1; ny <= y + 1; ++ny) {
         for (int nx = x - 1; nx <= x + 1; ++nx) {
-          if (nx < 0 || ny < 0 || nx >= size || ny >= size) continue;
-          const std::size_t n = static_cast<std::size_t>(ny) * size + nx;
+          if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
+          const std::size_t n = static_cast<std::size_t>(ny) * width + nx;
           if (!is_known[n]) continue;
           for (int c = 0; c < 3; ++c) sum[c] += rgba[4 * n + c];
           ++known;

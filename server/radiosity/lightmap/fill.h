@@ -19,7 +19,7 @@ struct FillCounts {
 
 /// Gives buried texels, and those outside within `padding` of a chart, the mean of their valid neighbours, ring by
 /// ring, so that bilinear look-ups at borders meet no black. Coverage (the fourth channel) stays as it is.
-/// Shapes: states [size * size]; rgba [size * size * 4].
-FillCounts fill_from_neighbours(std::span<const TexelState> states, int size, int padding, std::vector<float>& rgba);
+/// Shapes: one sheet: states [height * width]; rgba [height * width * 4].
+FillCounts fill_from_neighbours(std::span<const TexelState> states, int width, int padding, std::span<float> rgba);
 
 }  // namespace radbake::radiosity

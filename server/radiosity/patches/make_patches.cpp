@@ -124,6 +124,7 @@ class PatchBuilder {
       result_.group_of_[t] = grid_of_group[groups_.group_of[t]];
     }
     result_.maps_.resize(surfaces_.size());
+    result_.weights_.resize(surfaces_.size());
     result_.some_cell_.assign(surfaces_.size(), kNoPatch);
   }
 
@@ -148,6 +149,9 @@ class PatchBuilder {
       if (is_merged) at[k] = {0.5, 0.5, 0.5};
     }
     result_.maps_[t] = {at[0], at[1] - at[0], at[2] - at[0]};
+    const Vec3 n = surfaces_.normals[t];
+    const double twice_area = 2 * surfaces_.areas[t];
+    result_.weights_[t] = {cross(c[2] - c[0], n) / twice_area, cross(n, c[1] - c[0]) / twice_area};
 
     const GridPolygon whole = {{{0, 0}, at[0]}, {{1, 0}, at[1]}, {{0, 1}, at[2]}};
     const double cell_area = cell_size_[g].x * cell_size_[g].y;

@@ -14,16 +14,38 @@ std::uint32_t Patches::cell_at(std::uint32_t group, const std::array<std::int32_
   return found == sparse_.end() ? kNoPatch : found->second;
 }
 
-std::uint32_t Patches::find(std::uint32_t triangle, double u, double v, bool is_back) const {
+std::uint32_t Patches::cell_of(std::uint32_t triangle, Vec3 grid) const {
   const std::uint32_t group = group_of_[triangle];
-  const GridMap& map = maps_[triangle];
-  const Vec3 position = map.origin + map.per_u * u + map.per_v * v;
   std::array<std::int32_t, 3> at;
   for (int axis = 0; axis < 3; ++axis) {
-    at[axis] = std::clamp(static_cast<std::int32_t>(position[axis]), 0, grids_[group].cells[axis] - 1);
+    at[axis] = std::clamp(static_cast<std::int32_t>(grid[axis]), 0, grids_[group].cells[axis] - 1);
   }
-  std::uint32_t cell = cell_at(group, at);
+  return cell_at(group, at);
+}
+
+std::uint32_t Patches::find(std::uint32_t triangle, double u, double v, bool is_back) const {
+  const GridMap& map = maps_[triangle];
+  const Vec3 position = map.origin + map.per_u * u + map.per_v * v;
+  std::uint32_t cell = cell_of(triangle, position);
   if (cell == kNoPatch) cell = some_cell_[triangle];
+  const std::uint32_t front = part_at(cell, position);
+  return is_back ? back_of_cell_[front] : front;
+}
+
+std::uint32_t Patches::met_by(const Hit& hit, Vec3 direction, const Surfaces& surfaces) const {
+  const double cosine = dot(direction, surfaces.normals[hit.triangle]);
+  const bool is_back = cosine > 0;
+  // Go back along the ray, to a few times the height of ray origins, but not far where it grazes.
+  constexpr double kHeights = 4;
+  constexpr double kLeastCosine = 1.0 / 256;
+  const Vec3 back =
+      direction * (-kHeights * surfaces.ray_offsets[hit.triangle] / std::max(std::fabs(cosine), kLeastCosine));
+  const double u = hit.u + dot(weights_[hit.triangle][0], back), v = hit.v + dot(weights_[hit.triangle][1], back);
+  const GridMap& map = maps_[hit.triangle];
+  const Vec3 position = map.origin + map.per_u * u + map.per_v * v;
+  const std::uint32_t cell = cell_of(hit.triangle, position);
+  // Beyond the border of the surface there is no cell.
+  if (cell == kNoPatch) return find(hit.triangle, hit.u, hit.v, is_back);
   const std::uint32_t front = part_at(cell, position);
   return is_back ? back_of_cell_[front] : front;
 }

@@ -42,6 +42,12 @@ class Patches {
   /// Preconditions: u, v within the triangle up to rounding.
   std::uint32_t find(std::uint32_t triangle, double u, double v, bool is_back) const;
 
+  /// The patch that a ray of this direction (unit length) met, or kNoPatch at the back of a single-sided surface.
+  ///
+  /// Looked up where the ray was still a little above the surface: single precision may let a ray pass the foot of a
+  /// wall that stands there, and then its hit lies on the wrong side of the contact by as much.
+  std::uint32_t met_by(const Hit& hit, Vec3 direction, const Surfaces& surfaces) const;
+
   /// A point of the patch, uniform by area for uniform (x, y) in the unit square; continuous within a piece.
   SurfacePoint sample(std::uint32_t patch, double x, double y) const;
 
@@ -86,6 +92,8 @@ class Patches {
   };
 
   std::uint32_t part_at(std::uint32_t cell, Vec3 grid) const;
+  /// The cell of a triangle at a place of its grid, or kNoPatch.
+  std::uint32_t cell_of(std::uint32_t triangle, Vec3 grid) const;
   std::uint32_t cell_at(std::uint32_t group, const std::array<std::int32_t, 3>& at) const;
   static std::uint64_t flat_index(const Grid& grid, const std::array<std::int32_t, 3>& at) {
     return (static_cast<std::uint64_t>(at[2]) * grid.cells[1] + at[1]) * static_cast<std::uint64_t>(grid.cells[0]) +
@@ -102,12 +110,13 @@ class Patches {
   std::vector<double> areas_;
   std::vector<std::uint64_t> first_piece_;  ///< [num_cells + 1]
   std::vector<Piece> pieces_;
-  std::vector<std::uint32_t> back_of_cell_;  ///< [num_cells], kNoPatch: single-sided
-  std::vector<std::uint32_t> cell_of_back_;  ///< [size() - num_cells()]
-  std::vector<std::uint32_t> group_of_;      ///< [triangles]
-  std::vector<GridMap> maps_;                ///< [triangles]
-  std::vector<std::uint32_t> some_cell_;     ///< [triangles] a cell of it, for hits that round out of all
-  std::vector<Grid> grids_;                  ///< [groups]
+  std::vector<std::uint32_t> back_of_cell_;   ///< [num_cells], kNoPatch: single-sided
+  std::vector<std::uint32_t> cell_of_back_;   ///< [size() - num_cells()]
+  std::vector<std::uint32_t> group_of_;       ///< [triangles]
+  std::vector<GridMap> maps_;                 ///< [triangles]
+  std::vector<std::array<Vec3, 2>> weights_;  ///< [triangles] gradients of u and v over space
+  std::vector<std::uint32_t> some_cell_;      ///< [triangles] a cell of it, for hits that round out of all
+  std::vector<Grid> grids_;                   ///< [groups]
   std::vector<std::uint32_t> dense_;
   std::unordered_map<SparseCell, std::uint32_t, SparseCellHash> sparse_;
 };

@@ -6,25 +6,34 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene.h"
+#include "server/radiosity/lightmap/layout.h"
 #include "server/radiosity/survey/survey.h"
 
 namespace radbake::radiosity {
 
+/// What receives the light. Field for field radbake.v1.Output.
+enum class Output { kLightmap, kVertices, kBoth };
+
 /// What a user may ask for. Zero means: choose.
 struct BakeOptions {
-  int atlas_size = 0;  ///< texels along a side, 64..4096; 0: the smallest power of two that gives texels_per_meter
+  int atlas_size = 0;           ///< texels along a side, 64..4096; 0: as small as holds the scene at texels_per_meter
   double texels_per_meter = 0;  ///< 0: 32
   int rays = 0;                 ///< hemisphere rays a texel; a patch's row gets the same
   int max_patches = 0;
   std::uint64_t seed = 0;
+  LightmapUv lightmap_uv = LightmapUv::kAuto;
+  Output output = Output::kLightmap;
   int threads = 0;  ///< 0: all cores; changes no result
 };
 
 /// What a bake will do. Field for field radbake.v1.Plan.
 struct BakePlan {
   Survey survey;
-  int atlas_size = 0;
-  std::uint64_t num_texels = 0;  ///< inside charts
+  int atlas_size = 0;    ///< width of each lightmap; 0: vertices only
+  int atlas_height = 0;  ///< of each lightmap
+  int num_lightmaps = 0;
+  std::uint64_t num_texels = 0;         ///< inside charts
+  std::uint64_t num_vertex_groups = 0;  ///< vertices that receive light, counted once where they lie together
   std::uint64_t num_patches = 0;
   int rays_per_texel = 0;
   int rays_per_row = 0;

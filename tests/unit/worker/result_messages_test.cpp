@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,9 @@ radiosity::BakePlan full_plan() {
   plan.transport = "sparse";
   plan.solver = "gauss-seidel";
   plan.texels_per_meter = 20.5;
+  plan.atlas_height = 21;
+  plan.num_lightmaps = 22;
+  plan.num_vertex_groups = 23;
   plan.warnings = {{"plan_warning", "of the plan"}};
   return plan;
 }
@@ -81,7 +85,8 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   report.solver = {"gauss-seidel", "converged", 25, 26.5, 27.5, 28.5, 29.5};
   report.energy = {true, 30.5, 31.5, 32.5, 33.5, 34.5, 35.5, 36.5};
   report.transport = {37, 38.5, 39.5, 40.5, 41.5, 42, 43.5, 44.5};
-  report.lightmap = {45, 46, 47, 48, 49.5};
+  report.lightmap = {45, 46, 47, 48, 49.5, 50, 51, 52.5, 53, 54, 55, 56, 57.5, 58, 59.5, 60.5};
+  report.vertices = {61, 62, 63};
   report.warnings = {{"bake_warning", "of the bake"}};
   const v1::BakeReport message = to_message(report);
   EXPECT_THAT(unset_fields(message), ::testing::ElementsAre("engine_version", "run"));
@@ -93,6 +98,9 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   EXPECT_EQ(message.transport().num_entries(), 37U);
   EXPECT_EQ(message.transport().absorbed_share(), 44.5);
   EXPECT_EQ(message.lightmap().num_texels_dilated(), 48U);
+  EXPECT_EQ(message.lightmap().num_meshes_unwrapped(), 55U);
+  EXPECT_EQ(message.lightmap().seam_difference(), 60.5);
+  EXPECT_EQ(message.vertices().num_copies(), 63U);
   EXPECT_EQ(message.warnings(0).text(), "of the bake");
 }
 
@@ -118,6 +126,30 @@ TEST(ResultMessages, SetEveryFieldOfProgressTileAndLayer) {
   EXPECT_EQ(to_message(layer).height(), 32U);
 }
 
+TEST(ResultMessages, LayAMeshsDataAfterThatOfTheMeshesBeforeIt) {
+  radiosity::MeshOutput mesh;
+  mesh.placement = {radiosity::UvSource::kUnwrapped, 2, {0.5, 0.25}, {0.125, 0.75}};
+  mesh.num_vertices = 4;
+  mesh.source_vertices = {0, 1, 2, 0};
+  mesh.triangles = {{0, 1, 2}, {3, 2, 1}};
+  mesh.uvs = {{0.1f, 0.2f}, {0.3f, 0.4f}, {0.5f, 0.6f}, {0.7f, 0.8f}};
+  mesh.irradiance = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11, 12}};
+  std::string data = "12345678";
+  const v1::MeshResult message = to_message(mesh, data);
+  EXPECT_THAT(unset_fields(message), ::testing::IsEmpty());
+  EXPECT_EQ(message.uv_source(), v1::UV_UNWRAPPED);
+  EXPECT_EQ(message.uv_scale().y(), 0.25);
+  EXPECT_EQ(message.uv_offset().x(), 0.125);
+  EXPECT_EQ(message.data_offset(), 8U);
+  ASSERT_EQ(data.size(), 8 + 4 * 4 + 2 * 12 + 4 * 8 + 4 * 12U);
+  std::uint32_t corner = 0;
+  std::memcpy(&corner, data.data() + 8 + 4 * 4 + 3 * 4, 4);
+  EXPECT_EQ(corner, 3U);
+  float value = 0;
+  std::memcpy(&value, data.data() + data.size() - 4, 4);
+  EXPECT_EQ(value, 12);
+}
+
 TEST(ResultMessages, ReadEverySetting) {
   v1::BakeSettings settings;
   settings.set_atlas_size(256);
@@ -125,6 +157,8 @@ TEST(ResultMessages, ReadEverySetting) {
   settings.set_rays(512);
   settings.set_max_patches(1000);
   settings.set_seed(0xffffffffffffffff);
+  settings.set_lightmap_uv(v1::LIGHTMAP_UV_UNWRAP);
+  settings.set_output(v1::OUTPUT_BOTH);
   v1::RunOptions run;
   run.set_threads(3);
   const radiosity::BakeOptions options = to_options(settings, run);
@@ -133,6 +167,8 @@ TEST(ResultMessages, ReadEverySetting) {
   EXPECT_EQ(options.rays, 512);
   EXPECT_EQ(options.max_patches, 1000);
   EXPECT_EQ(options.seed, 0xffffffffffffffff);
+  EXPECT_EQ(options.lightmap_uv, radiosity::LightmapUv::kUnwrap);
+  EXPECT_EQ(options.output, radiosity::Output::kBoth);
   EXPECT_EQ(options.threads, 3);
 }
 

@@ -1,0 +1,167 @@
+#include "server/radiosity/gather/receive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace radbake::radiosity {
+namespace {
+
+/// A receiver of which less is visible is buried.
+constexpr double kMinVisibleShare = 0.5;
+constexpr std::uint32_t kNoPart = std::numeric_limits<std::uint32_t>::max();
+
+/// Whether no light that was reflected reaches a site, most of whose rays meet backs: the inside of something closed.
+bool looks_sealed(const GatherScene& scene, const RowSample& row, std::size_t site) {
+  const RowSample::SiteRays& own = row.of_site[site];
+  if (own.escaped > 0 || 2 * own.backs <= own.counted) return false;
+  for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
+    if (!(scene.radiosity[row.arrivals[own.first_arrival + k]] == Vec3{})) return false;
+  }
+  return true;
+}
+
+/// Leaves sites out that are sealed and that no lamp reaches either.
+void leave_out_sealed(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+  std::vector<std::uint8_t> is_other(scratch.sites.size(), 1);
+  bool is_any = false;
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    if (scratch.is_out[s] || !looks_sealed(scene, scratch.row, s)) continue;
+    is_other[s] = 0;
+    is_any = true;
+  }
+  if (!is_any) return;
+  Vec3 direct;
+  out.light_rays += scene.direct.estimate(scratch.sites, is_other, light_seed, scratch.light, std::span(&direct, 1));
+  if (!(direct == Vec3{})) return;
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) scratch.is_out[s] |= !is_other[s];
+}
+
+/// Whether two sites lie in one plane, as far as a segment between them tells whether something stands there.
+bool are_coplanar(const Site& a, const Site& b) {
+  constexpr double kFlat = 1e-3;
+  const Vec3 between = b.position - a.position;
+  const double limit = kFlat * length(between);
+  return std::fabs(dot(between, a.facing)) <= limit && std::fabs(dot(between, b.facing)) <= limit &&
+         dot(a.facing, b.facing) > 0;
+}
+
+/// Parts the sites by what stands between them, seen just above the surface. A site that cannot be seen from the first
+/// of a part is tried from a few others of it.
+class Parting {
+ public:
+  Parting(const GatherScene& scene, ReceiveScratch& scratch) : scene_(scene), scratch_(scratch) {}
+
+  /// Leaves all but the largest part out.
+  void keep_largest() {
+    scratch_.part.assign(scratch_.sites.size(), kNoPart);
+    std::uint32_t num_parts = 0;
+    for (std::uint32_t s = 0; s < scratch_.sites.size(); ++s) {
+      if (scratch_.is_out[s] || scratch_.part[s] != kNoPart) continue;
+      grow(s, num_parts++);
+    }
+    if (num_parts <= 1) return;
+    std::vector<std::uint32_t> sizes(num_parts, 0);
+    for (const std::uint32_t part : scratch_.part) {
+      if (part != kNoPart) ++sizes[part];
+    }
+    const auto largest = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+    for (std::size_t s = 0; s < scratch_.sites.size(); ++s) scratch_.is_out[s] |= scratch_.part[s] != largest;
+  }
+
+ private:
+  void grow(std::uint32_t first, std::uint32_t part) {
+    constexpr int kTries = 4;
+    scratch_.part[first] = part;
+    std::uint32_t from = first;
+    for (int attempt = 0; attempt < kTries; ++attempt) {
+      const std::uint32_t found = reach(from, part);
+      if (found == kNoPart) return;  // nobody is left
+      from = found;
+    }
+  }
+
+  /// Takes what is seen from a site into its part. Returns the last one taken, or `from`; kNoPart: all have a part.
+  std::uint32_t reach(std::uint32_t from, std::uint32_t part) {
+    scratch_.segments.clear();
+    targets_.clear();
+    std::uint32_t last = from;
+    bool is_anybody_left = false;
+    const Site& a = scratch_.sites[from];
+    for (std::uint32_t s = 0; s < scratch_.sites.size(); ++s) {
+      if (scratch_.is_out[s] || scratch_.part[s] != kNoPart) continue;
+      const Site& b = scratch_.sites[s];
+      if (!are_coplanar(a, b)) {
+        scratch_.part[s] = part;
+        continue;
+      }
+      Ray segment;
+      segment.origin = lifted_origin(scene_.surfaces, a.position, a.facing, a.point.triangle);
+      const auto end = lifted_origin(scene_.surfaces, b.position, b.facing, b.point.triangle);
+      for (int axis = 0; axis < 3; ++axis) segment.direction[axis] = end[axis] - segment.origin[axis];
+      segment.max_distance = 1;
+      scratch_.segments.push_back(segment);
+      targets_.push_back(s);
+    }
+    scratch_.is_blocked.resize(targets_.size());
+    scene_.visibility.blocked(scratch_.segments, scratch_.is_blocked);
+    for (std::size_t k = 0; k < targets_.size(); ++k) {
+      if (scratch_.is_blocked[k]) {
+        is_anybody_left = true;
+      } else {
+        scratch_.part[targets_[k]] = part;
+        last = targets_[k];
+      }
+    }
+    return is_anybody_left ? last : kNoPart;
+  }
+
+  const GatherScene& scene_;
+  ReceiveScratch& scratch_;
+  std::vector<std::uint32_t> targets_;
+};
+
+}  // namespace
+
+Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
+                  ReceiveScratch& scratch) {
+  Reception out;
+  const std::size_t num_sites = scratch.sites.size();
+  scene.rows.sample_row(scratch.sites, rays_seed, scratch.hemisphere, scratch.row);
+  out.rays = scratch.row.traced;
+
+  // Find the part that counts.
+  scratch.is_out = scratch.row.is_buried;
+  leave_out_sealed(scene, light_seed, scratch, out);
+  std::size_t visible = 0;
+  for (const std::uint8_t is_out : scratch.is_out) visible += !is_out;
+  if (static_cast<double>(visible) < kMinVisibleShare * static_cast<double>(num_sites)) return out;
+  Parting(scene, scratch).keep_largest();
+
+  // Gather what the patches reflect, and the sky.
+  Vec3 sum;
+  std::uint64_t escaped = 0, counted = 0;
+  for (std::size_t s = 0; s < num_sites; ++s) {
+    if (scratch.is_out[s]) continue;
+    const RowSample::SiteRays& own = scratch.row.of_site[s];
+    for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
+      sum += scene.radiosity[scratch.row.arrivals[own.first_arrival + k]];
+    }
+    escaped += own.escaped;
+    counted += own.counted;
+  }
+  if (counted == 0) return out;
+  sum += scene.sky * (std::numbers::pi * static_cast<double>(escaped));
+  out.irradiance = sum / static_cast<double>(counted);
+
+  // Add what the lights send straight.
+  Vec3 direct;
+  out.light_rays +=
+      scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light, std::span(&direct, 1));
+  out.irradiance += direct;
+  out.is_buried = false;
+  return out;
+}
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/radiosity/form_factor/hemisphere.h"
+#include "server/radiosity/lights/direct_light.h"
+#include "server/radiosity/patches/patches.h"
+
+namespace radbake::radiosity {
+
+/// What a gather reads. All parts outlive it.
+struct GatherScene {
+  const Surfaces& surfaces;
+  const Visibility& visibility;
+  const HemisphereEstimator& rows;
+  const DirectLight& direct;
+  std::span<const Vec3> radiosity;  ///< [patches] B'
+  Vec3 sky;                         ///< luminance, nit
+  std::uint64_t seed = 0;
+};
+
+/// Light that arrives at one receiver.
+struct Reception {
+  Vec3 irradiance;        ///< mean over the part that counts, lx
+  bool is_buried = true;  ///< most of it lies inside other geometry: irradiance means nothing
+  std::uint64_t rays = 0, light_rays = 0;
+};
+
+/// Buffers that one thread reuses from receiver to receiver.
+struct ReceiveScratch {
+  std::vector<Site> sites;
+  HemisphereEstimator::Scratch hemisphere;
+  DirectLight::Scratch light;
+  RowSample row;
+  std::vector<Ray> segments;
+  std::vector<std::uint8_t> is_blocked;
+  std::vector<std::uint8_t> is_out;
+  std::vector<std::uint32_t> part;
+};
+
+/// Gathers the light at scratch.sites, which are spread over one receiver.
+///
+///   H = sum_j F_j B'_j + F_sky pi L_sky + H^direct       over the visible part
+///
+/// A site does not count where it is buried: inside a single-sided object, or inside a closed object of any kind that
+/// no light enters (the ground under a box that stands on it). Where something thin stands across the receiver, only
+/// the larger part of it counts, so that no receiver mixes the light on both sides of a wall.
+/// `rays_seed`, `light_seed`: what the receiver is.
+Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch);
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "common/scene/scene.h"
+
+namespace radbake::tests {
+
+/// A sphere of radius 1 m about the origin, `rings` x 2 `rings` quads, seen from outside, with normals, without layout.
+Mesh make_sphere(int rings);
+
+/// A vase: a surface of revolution with a foot, a belly, a neck and an inside, 1.2 m high, with normals.
+Mesh make_vase(int segments);
+
+/// A hall of 20 x 6 x 15 m with 199 boxes of seeded sizes and places: 200 meshes without layout.
+Scene make_furnished_hall();
+
+}  // namespace radbake::tests

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "client/cli/exit_code.h"
+#include "client/cli/help_texts.h"
 #include "client/cli/values.h"
 #include "common/base/version.h"
 
@@ -22,69 +23,6 @@ const std::map<std::string, v1::Output> kOutputs = {
     {"lightmap", v1::OUTPUT_LIGHTMAP}, {"vertices", v1::OUTPUT_VERTICES}, {"both", v1::OUTPUT_BOTH}};
 const std::map<std::string, Encoding> kEncodings = {
     {"exr", Encoding::kExr}, {"hdr", Encoding::kHdr}, {"png-rgbm", Encoding::kRgbmPng}};
-constexpr char kServerHelp[] = "HOST:PORT or unix:PATH of a radbaked (environment: RADBAKE_SERVER)";
-constexpr char kExitCodes[] =
-    "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, 5 bake failed, 6 cancelled, 130 left by Ctrl-C.\n";
-
-constexpr char kMainFooter[] =
-    "\nExamples:\n"
-    "  radbake submit room.glb -o baked/                 bake here, with a private server\n"
-    "  radbake submit room.glb -o baked/ --server bakery:7419\n"
-    "  radbake submit --help                             what can be chosen, with more examples\n"
-    "  export RADBAKE_SERVER=bakery:7419; radbake list   what the server bakes and has baked\n\n";
-
-constexpr char kSubmitFooter[] =
-    "\nWrites to DIR, when all is done:\n"
-    "  scene.glb        the scene with its light: nothing lost, final TEXCOORD_1, the lightmap as MOZ_lightmap,\n"
-    "                   light by vertex as _IRRADIANCE\n"
-    "  lightmap_N.exr   irradiance in lx, linear Rec.709, float32; alpha is coverage; see --encoding\n"
-    "  lightmap_N.png   an exposed preview, for the eye only\n"
-    "  lightmaps.json   which primitive of which node lies where in which lightmap\n"
-    "  report.json      what was done, how well, and how long it took\n"
-    "The first line on stdout is the job's name. Ctrl-C cancels the job.\n"
-    "\nExamples:\n"
-    "  radbake submit room.glb -o baked/\n"
-    "      the lightmap is the smallest that gives 32 texels a metre; meshes without a usable TEXCOORD_1 are "
-    "unwrapped\n"
-    "  radbake submit level.glb -o baked/ --atlas-size 1024 --texels-per-meter 16 --encoding exr,png-rgbm\n"
-    "      sheets of 1024 texels, as many as it takes; for an engine that reads RGBM too\n"
-    "  radbake submit town.glb -o baked/ --output vertices --vertex-colors\n"
-    "      no lightmap: light at each vertex, and as COLOR_0 for viewers that know nothing else\n"
-    "  radbake submit room.glb -o baked/ --force --atlas-size 512 --rays 256\n"
-    "      a quick preview over the results of an earlier bake\n"
-    "  radbake submit house.glb -o baked/ --sky 3000,3500,5000 --sun 0.4,-1,0.3:80000,76000,70000\n"
-    "      daylight: a blue sky, and a sun that stands high\n"
-    "  radbake submit room.glb -o baked/ --json | jq -r 'select(.event == \"progress\") | .progress.fraction'\n"
-    "      one event a line, for programs\n\n";
-
-constexpr char kListFooter[] =
-    "\nExamples:\n"
-    "  radbake list --server bakery:7419\n"
-    "  radbake list --json | jq -r '.bakes[] | select(.state == \"FAILED\") | .name'\n\n";
-
-constexpr char kWatchFooter[] =
-    "\nCtrl-C leaves; the bake goes on.\n"
-    "\nExamples:\n"
-    "  radbake watch bakes/3f9c --server bakery:7419\n"
-    "  radbake watch bakes/3f9c && radbake download bakes/3f9c -o baked/\n\n";
-
-constexpr char kCancelFooter[] =
-    "\nAsks the bake to stop and returns at once; a bake that has ended stays as it is.\n"
-    "\nExamples:\n"
-    "  radbake cancel bakes/3f9c --server bakery:7419\n\n";
-
-constexpr char kDownloadFooter[] =
-    "\nWrites what submit would have written; scene.glb and lightmaps.json need the scene that was baked: --scene.\n"
-    "Results wait on the server for who asks.\n"
-    "\nExamples:\n"
-    "  radbake download bakes/3f9c -o baked/ --scene room.glb --server bakery:7419\n"
-    "  radbake download bakes/3f9c -o baked/ --server bakery:7419\n"
-    "  radbake download bakes/3f9c -o baked/ --force     over the results of an earlier bake\n\n";
-
-constexpr char kCapabilitiesFooter[] =
-    "\nExamples:\n"
-    "  radbake capabilities                              of a private server\n"
-    "  radbake capabilities --server bakery:7419 --json | jq .limits.max_triangles\n\n";
 
 /// The value of a parser, or CLI11's exception, which never leaves this file.
 template <typename T>

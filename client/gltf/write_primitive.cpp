@@ -32,6 +32,26 @@ int free_texcoord(const OrderedJson& attributes) {
   return n;
 }
 
+/// Gives an attribute another name, with its displacements in morph targets. The old name is free then.
+void rename_attribute(OrderedJson& primitive, const std::string& from, const std::string& to) {
+  const auto rename = [&](OrderedJson& attributes) {
+    if (!attributes.contains(from)) return;
+    const OrderedJson accessor = attributes[from];
+    attributes.erase(from);
+    attributes[to] = accessor;
+  };
+  rename(primitive["attributes"]);
+  if (!primitive.contains("targets")) return;
+  for (OrderedJson& target : primitive["targets"]) rename(target);
+}
+
+/// glTF counts TEXCOORDs from 0 without a gap.
+void fill_texcoord0(OrderedJson& attributes) {
+  if (attributes.contains("TEXCOORD_0")) return;
+  const OrderedJson same = attributes["TEXCOORD_1"];
+  attributes["TEXCOORD_0"] = same;
+}
+
 }  // namespace
 
 Result<PrimitiveWriter::Original*> PrimitiveWriter::original_of(std::pair<std::size_t, std::size_t> origin,
@@ -125,7 +145,8 @@ void PrimitiveWriter::rewrite(Original& original, const WrittenVertices& vertice
 }
 
 void PrimitiveWriter::write_texcoord1(const BakedPrimitive& baked, const WrittenVertices& vertices,
-                                      OrderedJson& attributes, MaterialUse& use) {
+                                      OrderedJson& primitive, MaterialUse& use) {
+  OrderedJson& attributes = primitive["attributes"];
   if (!keeps_own_uvs(*baked.baked) || !attributes.contains("TEXCOORD_1")) {
     std::vector<std::array<float, 2>> uvs;
     uvs.reserve(vertices.baked.size());
@@ -144,39 +165,36 @@ void PrimitiveWriter::write_texcoord1(const BakedPrimitive& baked, const Written
     // What was there may be looked up by the material's textures, or by somebody's program.
     if (attributes.contains("TEXCOORD_1")) {
       use.moved_texcoord1 = free_texcoord(attributes);
-      const OrderedJson moved = attributes["TEXCOORD_1"];
-      attributes["TEXCOORD_" + std::to_string(use.moved_texcoord1)] = moved;
+      rename_attribute(primitive, "TEXCOORD_1", "TEXCOORD_" + std::to_string(use.moved_texcoord1));
     }
     attributes["TEXCOORD_1"] = document_.add_accessor(elements_of(uvs), Document::Use::kVertices, {}, false);
   }
-  // glTF counts them from 0 without a gap.
-  if (!attributes.contains("TEXCOORD_0")) {
-    const OrderedJson same = attributes["TEXCOORD_1"];
-    attributes["TEXCOORD_0"] = same;
-  }
+  fill_texcoord0(attributes);
 }
 
 void PrimitiveWriter::write_irradiance(const BakedPrimitive& baked, const WrittenVertices& vertices,
-                                       OrderedJson& attributes) {
+                                       OrderedJson& primitive) {
   std::vector<std::array<float, 3>> irradiance;
   irradiance.reserve(vertices.baked.size());
   for (const std::uint32_t vertex : vertices.baked) {
     irradiance.push_back(vertex == kNoVertex ? std::array<float, 3>{} : baked.baked->irradiance[vertex]);
   }
-  attributes["_IRRADIANCE"] = document_.add_accessor(elements_of(irradiance), Document::Use::kVertices, {}, false);
-  if (max_irradiance_ > 0) write_colors(irradiance, attributes);
+  primitive["attributes"]["_IRRADIANCE"] =
+      document_.add_accessor(elements_of(irradiance), Document::Use::kVertices, {}, false);
+  if (max_irradiance_ > 0) write_colors(irradiance, primitive);
 }
 
 // COLOR_0 multiplies the base colour: with the colours that were there it becomes their product with the light, and
 // they stay as _COLOR_0_SOURCE.
-void PrimitiveWriter::write_colors(const std::vector<std::array<float, 3>>& irradiance, OrderedJson& attributes) {
+void PrimitiveWriter::write_colors(const std::vector<std::array<float, 3>>& irradiance, OrderedJson& primitive) {
+  OrderedJson& attributes = primitive["attributes"];
   if (attributes.contains("COLOR_0") && !attributes.contains("_COLOR_0_SOURCE")) {
-    const OrderedJson source = attributes["COLOR_0"];
-    attributes["_COLOR_0_SOURCE"] = source;
+    rename_attribute(primitive, "COLOR_0", "_COLOR_0_SOURCE");
   }
   Elements source;
   if (attributes.contains("_COLOR_0_SOURCE")) {
     source = document_.elements(attributes["_COLOR_0_SOURCE"].get<std::size_t>());
+    if (source.count != irradiance.size()) throw std::out_of_range("COLOR_0 has another number of values");
   }
   const std::size_t n = source.count > 0 ? num_components(source.type) : 0;
   std::vector<std::array<float, 4>> colors;
@@ -209,15 +227,10 @@ Result<MaterialUse> PrimitiveWriter::write(const BakedPrimitive& baked, std::pai
     RADBAKE_ASSIGN_OR_RETURN(const WrittenVertices vertices,
                              written_vertices(original->triangles, *baked.scene_vertex, *baked.mesh, mesh));
     if (is_split || original->is_compressed) rewrite(*original, vertices, primitive);
-    OrderedJson& attributes = primitive["attributes"];
-    if (mesh.lightmap >= 0) write_texcoord1(baked, vertices, attributes, use);
-    if (!mesh.irradiance.empty()) write_irradiance(baked, vertices, attributes);
+    if (mesh.lightmap >= 0) write_texcoord1(baked, vertices, primitive, use);
+    if (!mesh.irradiance.empty()) write_irradiance(baked, vertices, primitive);
   } else if (mesh.lightmap >= 0) {
-    OrderedJson& attributes = primitive["attributes"];
-    if (!attributes.contains("TEXCOORD_0")) {
-      const OrderedJson same = attributes["TEXCOORD_1"];
-      attributes["TEXCOORD_0"] = same;
-    }
+    fill_texcoord0(primitive["attributes"]);
   }
   return use;
 }

@@ -54,10 +54,10 @@ class PrimitiveWriter {
   OrderedJson rewritten_members(const Original& original, const Rewritten& way, const OrderedJson& primitive);
   std::size_t rewritten_accessor(const Original& original, const std::string& name, std::size_t accessor,
                                  const std::vector<std::uint32_t>& copied);
-  void write_texcoord1(const BakedPrimitive& baked, const WrittenVertices& vertices, OrderedJson& attributes,
+  void write_texcoord1(const BakedPrimitive& baked, const WrittenVertices& vertices, OrderedJson& primitive,
                        MaterialUse& use);
-  void write_irradiance(const BakedPrimitive& baked, const WrittenVertices& vertices, OrderedJson& attributes);
-  void write_colors(const std::vector<std::array<float, 3>>& irradiance, OrderedJson& attributes);
+  void write_irradiance(const BakedPrimitive& baked, const WrittenVertices& vertices, OrderedJson& primitive);
+  void write_colors(const std::vector<std::array<float, 3>>& irradiance, OrderedJson& primitive);
 
   Document& document_;
   double max_irradiance_;

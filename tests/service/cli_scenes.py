@@ -37,6 +37,23 @@ def square(positions=POSITIONS, indices=INDICES, emissive=(1, 1, 1)):
     }
 
 
+def glb_parts(content):
+    """The JSON and the binary chunk of a .glb."""
+    size, = struct.unpack_from("<I", content, 12)
+    return json.loads(content[20:20 + size]), content[20 + size + 8:]
+
+
+def floats(gltf, chunk, accessor):
+    """The numbers of an accessor of floats; its view has no gaps unless it says so."""
+    entry = gltf["accessors"][accessor]
+    assert entry["componentType"] == 5126
+    view = gltf["bufferViews"][entry["bufferView"]]
+    width = {"VEC2": 2, "VEC3": 3, "VEC4": 4}[entry["type"]]
+    start = view.get("byteOffset", 0) + entry.get("byteOffset", 0)
+    stride = view.get("byteStride", 4 * width)
+    return [x for i in range(entry["count"]) for x in struct.unpack_from(f"<{width}f", chunk, start + i * stride)]
+
+
 def with_change(change):
     scene = copy.deepcopy(square())
     change(scene)
@@ -70,6 +87,83 @@ def _corrupt_image(scene):
     scene["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 2
 
 
+def _with_view(scene, payload):
+    """Adds a buffer of its own for some bytes; returns the view."""
+    scene["buffers"].append({"byteLength": len(payload), "uri": "data:application/octet-stream;base64," +
+                             base64.b64encode(payload).decode()})
+    scene["bufferViews"].append({"buffer": len(scene["buffers"]) - 1, "byteLength": len(payload)})
+    return len(scene["bufferViews"]) - 1
+
+
+def _sparse(*indices):
+    """A change that replaces positions by a sparse list."""
+    def change(scene):
+        scene["accessors"][0]["sparse"] = {
+            "count": len(indices),
+            "indices": {"bufferView": _with_view(scene, struct.pack(f"<{len(indices)}H", *indices)), "componentType": 5123},
+            "values": {"bufferView": _with_view(scene, bytes(12 * len(indices)))}}
+    return change
+
+
+def _short_sparse_values(scene):
+    _sparse(1, 2)(scene)
+    scene["bufferViews"][-1]["byteLength"] = 16
+
+
+def _short_strip(scene):
+    scene["meshes"][0]["primitives"][0]["mode"] = 5
+    scene["accessors"][1]["count"] = 2
+
+
+def _unbacked(scene):
+    scene["accessors"][0].pop("bufferView")
+    for accessor in scene["accessors"]:
+        accessor["count"] = 7654321
+    scene["accessors"][2].pop("bufferView")
+    scene["meshes"][0]["primitives"][0].pop("indices")
+
+
+def _quantised(scene):
+    scene["extensionsUsed"] = scene["extensionsRequired"] = ["KHR_mesh_quantization"]
+    scene["accessors"][0]["componentType"] = 5125
+
+
+def _colors(component_type, payload):
+    """A change that adds vertex colours."""
+    def change(scene):
+        scene["accessors"].append({"bufferView": _with_view(scene, payload), "componentType": component_type,
+                                   "type": "VEC4", "count": 4})
+        scene["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = len(scene["accessors"]) - 1
+    return change
+
+
+def _texture_transform(transform):
+    """A change that puts a texture on the emission, with a transform."""
+    def change(scene):
+        scene["images"] = [{"uri": "any.png"}]
+        scene["textures"] = [{"source": 0}]
+        scene["materials"][0]["emissiveTexture"] = {"index": 0, "texCoord": 1,
+                                                    "extensions": {"KHR_texture_transform": transform}}
+    return change
+
+
+def _two_sets(scene):
+    _texture_transform({"texCoord": 2})(scene)
+    scene["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+
+
+def _beyond_the_view(scene):
+    scene["bufferViews"][0]["byteLength"] = 5000
+
+
+def _instances_without_end(scene):
+    """30,000 triangles, placed 2,000 times."""
+    view = _with_view(scene, bytes(2 * 90000))
+    scene["accessors"][1].update(bufferView=view, count=90000)
+    scene["nodes"] = [{"mesh": 0} for _ in range(2000)]
+    scene["scenes"][0]["nodes"] = list(range(2000))
+
+
 def bad_scenes(glb: pathlib.Path):
     """(file name, bytes, a word of the message that names what is wrong) of each kind of bad input."""
     nan = json.dumps(square(positions=[(0, 0, 0), (math.nan, 0, 0), (1, 0, -1), (0, 0, -1)])).encode()
@@ -90,4 +184,22 @@ def bad_scenes(glb: pathlib.Path):
         ("draco.gltf", with_change(_corrupt_draco), "raco"),
         ("image.gltf", with_change(_corrupt_image), "noise"),
         ("external.gltf", with_change(_set(["buffers", 0, "uri"], "nowhere.bin")), "nowhere.bin"),
+        ("outside.gltf", with_change(_set(["buffers", 0, "uri"], "../tmp")), "../tmp"),
+        ("beyond.gltf", with_change(_beyond_the_view), "5000"),
+        ("strip.gltf", with_change(_short_strip), "strip has 2 corners"),
+        ("sparse_index.gltf", with_change(_sparse(1, 4)), "sparse index 1 is 4"),
+        ("sparse_order.gltf", with_change(_sparse(2, 1)), "sparse index 1 is 1 after 2"),
+        ("sparse_values.gltf", with_change(_short_sparse_values), "16"),
+        ("unbacked.gltf", with_change(_unbacked), "7654321"),
+        ("quantised.gltf", with_change(_quantised), "32-bit unsigned integers"),
+        ("color_type.gltf", with_change(_colors(5121, bytes(16))), "COLOR_0"),
+        ("color_nan.gltf", with_change(_colors(5126, struct.pack("<16f", *[1] * 10, math.nan, *[1] * 5))), "vertex 2"),
+        ("uv_transform.gltf", with_change(_texture_transform({"scale": 3})), "scale is 3"),
+        ("uv_nan.gltf", with_change(_texture_transform({"offset": [math.nan, 0]})), "JSON"),
+        ("uv_null.gltf", with_change(_texture_transform({"rotation": None})), "rotation is null"),
+        ("uv_sets.gltf", with_change(_two_sets), "TEXCOORD_2"),
+        ("texel_density.gltf", with_change(_set(["nodes", 0, "extras"], {"radbake_texel_density": 1000})), "1000"),
+        ("instances.gltf", with_change(_instances_without_end), "limit of 50000000"),
+        ("matrix.gltf", with_change(_set(["nodes", 0, "matrix"], [1, 0, 0, 5] + [0, 1, 0, 0] + [0, 0, 1, 0] + [0, 0, 0, 1])),
+         "matrix"),
     ]

@@ -7,6 +7,7 @@ import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -62,9 +63,9 @@ class PrivateServer(CliTest):
         self.assert_exit(result, 0)
         lines = result.stdout.splitlines()
         self.assertRegex(lines[0], r"^bakes/\w+$")
-        names = ["lightmap_0.exr", "lightmap_0.png", "report.json"]
+        names = ["lightmap_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json", "report.json"]
         self.assertEqual(lines[1:], [str(self.place / "out" / name) for name in names])
-        self.assertEqual(sorted(os.listdir(self.place / "out")), names)
+        self.assertEqual(sorted(os.listdir(self.place / "out")), sorted(names))
         report = json.loads((self.place / "out" / "report.json").read_text())
         self.assertEqual(report["scene"]["name"], "cornell.glb")
         self.assertEqual(report["lightmap"]["atlas_size"], 64)
@@ -94,7 +95,8 @@ class PrivateServer(CliTest):
         reports, images = [], []
         for name, threads in (("a", 1), ("b", 2), ("c", 2)):
             self.assert_exit(self.run_cli("submit", CORNELL, "-o", self.place / name, "--threads", threads, *QUICK), 0)
-            images.append((self.place / name / "lightmap_0.exr").read_bytes())
+            images.append([(self.place / name / file).read_bytes()
+                           for file in ("lightmap_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json")])
             report = json.loads((self.place / name / "report.json").read_text())
             self.assertEqual(list(report)[-1], "run")
             del report["run"]
@@ -130,7 +132,7 @@ class PrivateServer(CliTest):
         self.assertEqual(os.listdir(self.place / "out"), ["mine.txt"])
         self.assert_exit(self.run_cli("submit", CORNELL, "-o", self.place / "out", "--force", *QUICK), 0)
         self.assertEqual(sorted(os.listdir(self.place / "out")),
-                         ["lightmap_0.exr", "lightmap_0.png", "mine.txt", "report.json"])
+                         ["lightmap_0.exr", "lightmap_0.png", "lightmaps.json", "mine.txt", "report.json", "scene.glb"])
 
     def test_a_missing_server_program_is_named(self):
         alone = self.place / "alone"
@@ -181,6 +183,123 @@ class PrivateServer(CliTest):
             self.assert_exit(self.run_cli(*arguments), 2)
 
 
+class Outputs(CliTest):
+    """scene.glb and its sidecar, looked into as an engine would."""
+
+    def bake(self, scene, *arguments):
+        result = self.run_cli("submit", scene, "-o", self.place / "out", *QUICK, *arguments)
+        self.assert_exit(result, 0)
+        self.folder = self.place / "out"
+        self.sidecar = json.loads((self.folder / "lightmaps.json").read_text())
+        self.gltf, self.chunk = cli_scenes.glb_parts((self.folder / "scene.glb").read_bytes())
+        return result
+
+    def primitive(self, entry):
+        """The primitive of scene.glb that an entry of the sidecar speaks of."""
+        mesh = self.gltf["nodes"][entry["node"]]["mesh"]
+        return self.gltf["meshes"][mesh]["primitives"][entry["primitive"]]
+
+    def floats(self, accessor):
+        return cli_scenes.floats(self.gltf, self.chunk, accessor)
+
+    def test_every_primitive_has_its_lightmap(self):
+        self.bake(CORNELL)
+        lightmap, = self.sidecar["lightmaps"]
+        self.assertEqual((lightmap["name"], lightmap["quantity"], lightmap["unit"]), ("lightmap_0", "irradiance", "lx"))
+        self.assertEqual([entry["file"] for entry in lightmap["files"]], ["lightmap_0.exr"])
+        self.assertEqual([(m["node_name"], m["primitive"]) for m in self.sidecar["meshes"]],
+                         [("cornell", i) for i in range(4)])
+        for entry in self.sidecar["meshes"]:
+            primitive = self.primitive(entry)
+            extension = self.gltf["materials"][primitive["material"]]["extensions"]["MOZ_lightmap"]
+            self.assertEqual(extension["intensity"], lightmap["maximum"])
+            self.assertEqual(entry["uv_source"], "kept")
+            image = self.gltf["images"][self.gltf["textures"][extension["index"]]["source"]]
+            view = self.gltf["bufferViews"][image["bufferView"]]
+            png = self.chunk[view["byteOffset"]:view["byteOffset"] + view["byteLength"]]
+            # Width, height, 16 bits, three channels.
+            self.assertEqual(png[16:26], struct.pack(">IIBB", lightmap["width"], lightmap["height"], 16, 2))
+
+    def test_instances_get_places_of_their_own(self):
+        scene = cli_scenes.square()
+        scene["nodes"].append({"name": "ceiling", "mesh": 0, "translation": [0, 1, 0], "rotation": [1, 0, 0, 0]})
+        scene["scenes"][0]["nodes"] = [0, 1]
+        path = self.place / "two.gltf"
+        path.write_text(json.dumps(scene))
+        self.bake(path, "--texels-per-meter", "8")
+        self.assertEqual([(m["node_name"], m["lightmap"]) for m in self.sidecar["meshes"]],
+                         [("floor", 0), ("ceiling", 0)])
+        boxes = []
+        for entry in self.sidecar["meshes"]:
+            uvs = self.floats(self.primitive(entry)["attributes"]["TEXCOORD_1"])
+            boxes.append((min(uvs[::2]), min(uvs[1::2]), max(uvs[::2]), max(uvs[1::2])))
+            self.assertGreaterEqual(min(boxes[-1]), 0)
+            self.assertLessEqual(max(boxes[-1]), 1)
+            if entry["uv_source"] == "placed":
+                own = cli_scenes.TEXCOORDS
+                placed = [s * x + o for uv in own for x, s, o in zip(uv, entry["scale"], entry["offset"])]
+                for got, want in zip(uvs, placed):
+                    self.assertAlmostEqual(got, want, delta=1e-6)  # float32
+        a, b = boxes
+        self.assertTrue(a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1], f"{a} and {b} overlap")
+
+    def test_a_full_sheet_is_followed_by_another(self):
+        scene = cli_scenes.square()
+        scene["nodes"].append({"name": "ceiling", "mesh": 0, "translation": [0, 1, 0], "rotation": [1, 0, 0, 0]})
+        scene["scenes"][0]["nodes"] = [0, 1]
+        path = self.place / "two.gltf"
+        path.write_text(json.dumps(scene))
+        self.bake(path)  # a metre takes 32 of 64 texels, and padding: two side by side do not fit
+        self.assertEqual([(m["lightmap"], m["file"]) for m in self.sidecar["meshes"]],
+                         [(0, "lightmap_0.exr"), (1, "lightmap_1.exr")])
+        for entry in self.sidecar["meshes"]:
+            lightmap = self.sidecar["lightmaps"][entry["lightmap"]]
+            material = self.gltf["materials"][self.primitive(entry)["material"]]
+            self.assertEqual(material["name"], "glow")
+            self.assertEqual(material["extensions"]["MOZ_lightmap"]["intensity"], lightmap["maximum"] or 1)
+
+    def test_a_mesh_without_a_layout_is_unwrapped(self):
+        self.bake(SCENES / "tile-game-room6.glb", "--sky", "1,1,1", "--texels-per-meter", "1")
+        self.assertIn("unwrapped", [m["uv_source"] for m in self.sidecar["meshes"]])
+        for entry in self.sidecar["meshes"]:
+            attributes = self.primitive(entry)["attributes"]
+            uvs = self.floats(attributes["TEXCOORD_1"])
+            self.assertTrue(all(0 <= x <= 1 for x in uvs))
+            counts = {self.gltf["accessors"][accessor]["count"] for accessor in attributes.values()}
+            self.assertEqual(counts, {len(uvs) // 2})
+
+    def test_light_by_vertex_needs_no_image(self):
+        result = self.bake(CORNELL, "--output", "vertices", "--vertex-colors")
+        names = ["scene.glb", "lightmaps.json", "report.json"]
+        self.assertEqual(result.stdout.splitlines()[1:], [str(self.folder / name) for name in names])
+        self.assertEqual(sorted(os.listdir(self.folder)), sorted(names))
+        self.assertEqual(self.sidecar["lightmaps"], [])
+        self.assertNotIn("images", self.gltf)
+        brightest = 0
+        for entry in self.sidecar["meshes"]:
+            attributes = self.primitive(entry)["attributes"]
+            light = self.floats(attributes["_IRRADIANCE"])
+            self.assertEqual(len(light) // 3, self.gltf["accessors"][attributes["POSITION"]]["count"])
+            colours = self.floats(attributes["COLOR_0"])
+            for vertex in range(len(light) // 3):
+                for channel in range(3):
+                    expected = light[3 * vertex + channel] / self.sidecar["vertices"]["maximum"]
+                    self.assertAlmostEqual(colours[4 * vertex + channel], expected, delta=1e-6)  # float32
+            brightest = max(brightest, *light)
+        self.assertEqual(brightest, self.sidecar["vertices"]["maximum"])
+        self.assertGreater(brightest, 0)
+
+    def test_both_kinds_of_light_and_all_encodings(self):
+        self.bake(CORNELL, "--output", "both", "--encoding", "png-rgbm,hdr,exr")
+        self.assertEqual(sorted(os.listdir(self.folder)),
+                         ["lightmap_0.exr", "lightmap_0.hdr", "lightmap_0.png", "lightmap_0_rgbm.png", "lightmaps.json",
+                          "report.json", "scene.glb"])
+        self.assertEqual([f["encoding"] for f in self.sidecar["lightmaps"][0]["files"]], ["png-rgbm", "hdr", "exr"])
+        self.assertTrue((self.folder / "lightmap_0.hdr").read_bytes().startswith(b"#?RADIANCE"))
+        for entry in self.sidecar["meshes"]:
+            self.assertLessEqual({"TEXCOORD_1", "_IRRADIANCE"}, set(self.primitive(entry)["attributes"]))
+
+
 class SharedServer(CliTest):
     def setUp(self):
         super().setUp()
@@ -222,12 +341,34 @@ class SharedServer(CliTest):
         downloaded = self.run_cli("download", name.removeprefix("bakes/"), "-o", self.place / "again", "--json")
         self.assert_exit(downloaded, 0)
         self.assertEqual(json.loads(downloaded.stdout)["files"], ["lightmap_0.exr", "lightmap_0.png", "report.json"])
-        for file in ("lightmap_0.exr", "lightmap_0.png"):
-            self.assertEqual((self.place / "out" / file).read_bytes(), (self.place / "again" / file).read_bytes())
+        self.assertIn("--scene", downloaded.stderr)
+        with_scene = self.run_cli("download", name, "-o", self.place / "again", "--force", "--scene", CORNELL)
+        self.assert_exit(with_scene, 0)
+        for file in ("lightmap_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json"):
+            self.assertEqual((self.place / "out" / file).read_bytes(), (self.place / "again" / file).read_bytes(), file)
 
         cancelled = self.run_cli("cancel", name, "--json")
         self.assert_exit(cancelled, 0)
         self.assertEqual(json.loads(cancelled.stdout)["state"], "SUCCEEDED")
+
+    def test_a_download_refuses_a_scene_that_is_not_the_bakes(self):
+        scene = self.place / "square.gltf"
+        scene.write_text(json.dumps(cli_scenes.square()))
+        submitted = self.run_cli("submit", scene, "-o", self.place / "out", *QUICK)
+        self.assert_exit(submitted, 0)
+        name = submitted.stdout.splitlines()[0]
+        # Another material or light is no other scene: what is written comes from the meshes.
+        scene.write_text(json.dumps(cli_scenes.square(emissive=(0, 0, 0))))
+        self.assert_exit(self.run_cli("download", name, "-o", self.place / "dark", "--scene", scene), 0)
+        moved = [(0, 0, 0), (1, 0, 0), (1, 0, -2), (0, 0, -1)]
+        scene.write_text(json.dumps(cli_scenes.square(positions=moved)))
+        refused = self.run_cli("download", name, "-o", self.place / "moved", "--scene", scene)
+        self.assert_exit(refused, 3)
+        self.assertIn(f"square.gltf is not the scene of {name}: mesh 'floor/square#0' has changed", refused.stderr)
+        self.assertFalse((self.place / "moved").exists())
+        missing = self.run_cli("download", name, "-o", self.place / "moved", "--scene", self.place / "nowhere.glb")
+        self.assert_exit(missing, 3)
+        self.assertIn("nowhere.glb", missing.stderr)
 
     def test_ctrl_c_in_submit_cancels_the_job(self):
         process, name = self.start_long_bake()

@@ -105,6 +105,19 @@ TEST(WriteGltf, SendsTexturesToWhereTheirCoordinatesWent) {
   EXPECT_EQ(written.primitive(0)["attributes"]["TEXCOORD_2"], 2);
 }
 
+TEST(WriteGltf, MovesDisplacementsWithTheCoordinatesThatTheyMove) {
+  GltfBuilder file = mapped_square();
+  const int moves = file.add_floats({0, 0, 0.5, 0, 0, 0, 0, 0}, "VEC2");
+  file.document["meshes"][0]["primitives"][0]["targets"] = json::array({{{"TEXCOORD_1", moves}}});
+  const auto place = [](const Scene&, std::vector<BakedMesh>& baked) {
+    baked[0].lightmap = 0;
+    baked[0].uv_scale = {0.5, 0.5};
+  };
+  const Written written = write_baked(file.glb(), place);
+  ASSERT_TRUE(written.result.ok()) << written.result.error().message;
+  EXPECT_EQ(written.primitive(0)["targets"].dump(), "[{\"TEXCOORD_2\":" + std::to_string(moves) + "}]");
+}
+
 TEST(WriteGltf, GivesInstancesOwnMeshesAndMaterialsWhereTheirLightDiffers) {
   GltfBuilder file = mapped_square();
   file.add_root({{"mesh", 0}, {"translation", {5, 0, 0}}});

@@ -28,7 +28,7 @@ LIMIT_SECONDS = 240
 SIZE = 256
 # What is told apart: colour of a channel, 0 to 1 in sRGB, mean over pixels that both drawings cover wholly.
 # A texel of the PNG is off by up to half a step of 1/255 of the map's brightest, and edges are smoothed otherwise:
-# measured 0.0014 for the Cornell box.
+# measured 0.0036 (Cornell box) and 0.0033 (room), correlations 0.999 and 0.997.
 MAX_MEAN_DIFFERENCE = 0.006
 MIN_CORRELATION = 0.99
 # Pixels that one drawing covers and the other does not: outlines only.

@@ -117,9 +117,8 @@ def _short_strip(scene):
 
 def _unbacked(scene):
     scene["accessors"][0].pop("bufferView")
-    for accessor in scene["accessors"]:
-        accessor["count"] = 7654321
     scene["accessors"][2].pop("bufferView")
+    scene["accessors"][0]["count"] = scene["accessors"][2]["count"] = 7654321
     scene["meshes"][0]["primitives"][0].pop("indices")
 
 

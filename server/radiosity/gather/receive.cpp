@@ -8,8 +8,10 @@
 namespace radbake::radiosity {
 namespace {
 
-/// A receiver of which less is visible is buried.
-constexpr double kMinVisibleShare = 0.5;
+/// A receiver of which less is visible is buried: too few sites to stand for a part.
+constexpr double kMinVisibleShare = 0.125;
+/// Where less is visible, the part that is gets all of the receiver's rays.
+constexpr double kRetracedShare = 0.5;
 constexpr std::uint32_t kNoPart = std::numeric_limits<std::uint32_t>::max();
 
 /// Whether no light that was reflected reaches a site, most of whose rays meet backs: the inside of something closed.
@@ -122,27 +124,44 @@ class Parting {
   std::vector<std::uint32_t> targets_;
 };
 
+/// Traces the sites' rows and marks what does not count. Returns the share that does.
+double trace_and_sort_out(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
+                          ReceiveScratch& scratch, Reception& out) {
+  scene.rows.sample_row(scratch.sites, rays_seed, scratch.hemisphere, scratch.row);
+  out.rays += scratch.row.traced;
+  scratch.is_out = scratch.row.is_buried;
+  leave_out_sealed(scene, light_seed, scratch, out);
+  Parting(scene, scratch).keep_largest();
+  const auto num_out = std::count(scratch.is_out.begin(), scratch.is_out.end(), 1);
+  return 1 - static_cast<double>(num_out) / static_cast<double>(scratch.sites.size());
+}
+
+/// Puts the sites that count in the place of those that do not.
+void repeat_visible_sites(ReceiveScratch& scratch) {
+  std::vector<Site> visible;
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    if (!scratch.is_out[s]) visible.push_back(scratch.sites[s]);
+  }
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) scratch.sites[s] = visible[s % visible.size()];
+}
+
 }  // namespace
 
 Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
                   ReceiveScratch& scratch) {
   Reception out;
-  const std::size_t num_sites = scratch.sites.size();
-  scene.rows.sample_row(scratch.sites, rays_seed, scratch.hemisphere, scratch.row);
-  out.rays = scratch.row.traced;
-
   // Find the part that counts.
-  scratch.is_out = scratch.row.is_buried;
-  leave_out_sealed(scene, light_seed, scratch, out);
-  std::size_t visible = 0;
-  for (const std::uint8_t is_out : scratch.is_out) visible += !is_out;
-  if (static_cast<double>(visible) < kMinVisibleShare * static_cast<double>(num_sites)) return out;
-  Parting(scene, scratch).keep_largest();
+  const double visible = trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
+  if (visible < kMinVisibleShare) return out;
+  if (visible < kRetracedShare) {
+    repeat_visible_sites(scratch);
+    trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
+  }
 
   // Gather what the patches reflect, and the sky.
   Vec3 sum;
   std::uint64_t escaped = 0, counted = 0;
-  for (std::size_t s = 0; s < num_sites; ++s) {
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
     if (scratch.is_out[s]) continue;
     const RowSample::SiteRays& own = scratch.row.of_site[s];
     for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "client/gltf/decode_draco.h"
@@ -120,6 +122,77 @@ TEST(GltfDraco, NamesAnAttributeOfAnotherSize) {
   Compressed grid = compressed_grid(draco::MESH_EDGEBREAKER_ENCODING);
   std::swap(grid.uv_id, grid.position_id);
   expect_refused(read_bytes(draco_file(grid).glb()), {"attribute 1 (POSITION) holds 2 numbers a vertex, not 3"});
+}
+
+// A square of 256 steps a side whose positions are integers, with normalised colours: red at x = 0, white elsewhere.
+GltfBuilder file_of_integers(bool is_position_normalized) {
+  draco::TriangleSoupMeshBuilder builder;
+  builder.Start(2);
+  const int position = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_INT16);
+  const int color = builder.AddAttribute(draco::GeometryAttribute::COLOR, 4, draco::DT_UINT8);
+  const std::int16_t corners[2][3][3] = {{{0, 0, 0}, {256, 0, 0}, {256, 256, 0}},
+                                         {{0, 0, 0}, {256, 256, 0}, {0, 256, 0}}};
+  for (int face = 0; face < 2; ++face) {
+    std::uint8_t colors[3][4];
+    for (int k = 0; k < 3; ++k) {
+      const std::uint8_t other = corners[face][k][0] == 0 ? 0 : 255;
+      std::copy_n(std::array<std::uint8_t, 4>{255, other, other, 255}.begin(), 4, colors[k]);
+    }
+    const auto& p = corners[face];
+    builder.SetAttributeValuesForFace(position, draco::FaceIndex(face), p[0], p[1], p[2]);
+    builder.SetAttributeValuesForFace(color, draco::FaceIndex(face), colors[0], colors[1], colors[2]);
+  }
+  const auto mesh = builder.Finalize();
+  draco::Encoder encoder;
+  draco::EncoderBuffer buffer;
+  EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+  GltfBuilder file;
+  const int view = file.add_view({buffer.data(), buffer.size()});
+  file.add("accessors",
+           {{"componentType", 5122}, {"type", "VEC3"}, {"count", 4}, {"normalized", is_position_normalized}});
+  file.add("accessors", {{"componentType", 5121}, {"type", "VEC4"}, {"count", 4}, {"normalized", true}});
+  file.add("accessors", {{"componentType", 5123}, {"type", "SCALAR"}, {"count", 6}});
+  const json ids = {{"POSITION", mesh->attribute(position)->unique_id()},
+                    {"COLOR_0", mesh->attribute(color)->unique_id()}};
+  file.add_root(
+      {{"mesh", file.add_mesh(
+                    {{"attributes", {{"POSITION", 0}, {"COLOR_0", 1}}},
+                     {"indices", 2},
+                     {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", ids}}}}}})}});
+  return file;
+}
+
+TEST(GltfDraco, ReadsIntegersAsTheirAccessorsSay) {
+  for (const bool is_normalized : {false, true}) {
+    const auto result = read_bytes(file_of_integers(is_normalized).glb());
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    const Mesh& mesh = result->scene.meshes.at(0);
+    ASSERT_EQ(mesh.positions.size(), 4u);
+    ASSERT_EQ(mesh.colors.size(), 4u);
+    const double side = is_normalized ? 256.0 / 32767 : 256;
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_TRUE(mesh.positions[i].x == 0 || mesh.positions[i].x == side) << mesh.positions[i].x;
+      EXPECT_EQ(mesh.colors[i], mesh.positions[i].x == 0 ? (Vec3{1, 0, 0}) : (Vec3{1, 1, 1}));
+    }
+  }
+}
+
+TEST(GltfDraco, NamesIntegersThatAnAttributeCannotHold) {
+  GltfBuilder file = file_of_integers(false);
+  file.document["accessors"][1]["normalized"] = false;
+  expect_refused(read_bytes(file.glb()), {"(COLOR_0) holds 8-bit unsigned integers", "normalised"});
+}
+
+// Decoded triangles are a list, whatever the file's mode; its indices may count those of a strip or of the list.
+TEST(GltfDraco, ReadsACompressedStrip) {
+  for (const std::size_t count : {kTriangles + 2, 3 * kTriangles}) {
+    GltfBuilder file = draco_file(compressed_grid(draco::MESH_EDGEBREAKER_ENCODING));
+    file.document["meshes"][0]["primitives"][0]["mode"] = 5;
+    file.document["accessors"][2]["count"] = count;
+    const auto result = read_bytes(file.glb());
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_EQ(result->scene.meshes.at(0).triangles.size(), kTriangles);
+  }
 }
 
 TEST(GltfDraco, SurvivesAnyFlippedByte) {

@@ -51,7 +51,7 @@ class LayoutMaker {
     layout_.corners.resize(surfaces_.size());
     layout_.chart_of.assign(surfaces_.size(), kNoChart);
     find_objects();
-    if (options_.uv != LightmapUv::kUnwrap && is_disjoint_as_given()) {
+    if (options_.uv != LightmapUv::kUnwrap && can_be_kept()) {
       keep();
       return std::move(layout_);
     }
@@ -81,13 +81,22 @@ class LayoutMaker {
     }
   }
 
-  bool is_disjoint_as_given() {
+  /// Whether TEXCOORD_1 is disjoint over the whole scene. Says where it is not, if that is all that is wrong with it.
+  bool can_be_kept() {
     std::vector<MeshRange> used;
     for (const Object& object : objects_) {
       if (!object.fault.empty()) return false;
       for (const std::uint32_t m : object.meshes) used.push_back(ranges_[m]);
     }
-    return given_overlap(surfaces_, used).share <= kToleratedOverlap;
+    const GivenOverlap overlap = given_overlap(surfaces_, used);
+    const bool is_disjoint = overlap.share <= kToleratedOverlap;
+    if (!overlap.names.empty()) {
+      layout_.warnings.push_back(
+          {"lightmap_uv_overlap", "TEXCOORD_1 overlaps: " + overlap.names +
+                                      (is_disjoint ? "; the light there is mixed"
+                                                   : "; so every object gets a rectangle of its own for its layout")});
+    }
+    return is_disjoint;
   }
 
   /// Takes TEXCOORD_1 as it is, in one sheet.

@@ -55,21 +55,19 @@ class Parting {
  public:
   Parting(const GatherScene& scene, ReceiveScratch& scratch) : scene_(scene), scratch_(scratch) {}
 
-  /// Leaves all but the largest part out.
-  void keep_largest() {
+  /// Numbers the parts in scratch.part. Returns how many sites each has.
+  std::vector<std::uint32_t> find_parts() {
     scratch_.part.assign(scratch_.sites.size(), kNoPart);
-    std::uint32_t num_parts = 0;
+    std::vector<std::uint32_t> sizes;
     for (std::uint32_t s = 0; s < scratch_.sites.size(); ++s) {
       if (scratch_.is_out[s] || scratch_.part[s] != kNoPart) continue;
-      grow(s, num_parts++);
+      grow(s, static_cast<std::uint32_t>(sizes.size()));
+      sizes.push_back(0);
     }
-    if (num_parts <= 1) return;
-    std::vector<std::uint32_t> sizes(num_parts, 0);
     for (const std::uint32_t part : scratch_.part) {
       if (part != kNoPart) ++sizes[part];
     }
-    const auto largest = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
-    for (std::size_t s = 0; s < scratch_.sites.size(); ++s) scratch_.is_out[s] |= scratch_.part[s] != largest;
+    return sizes;
   }
 
  private:
@@ -124,6 +122,53 @@ class Parting {
   std::vector<std::uint32_t> targets_;
 };
 
+/// The light at the sites that are not out, from the row that was traced for them.
+Vec3 irradiance_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+  // Gather what the patches reflect, and the sky.
+  Vec3 sum;
+  std::uint64_t escaped = 0, counted = 0;
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    if (scratch.is_out[s]) continue;
+    const RowSample::SiteRays& own = scratch.row.of_site[s];
+    for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
+      sum += scene.radiosity[scratch.row.arrivals[own.first_arrival + k]];
+    }
+    escaped += own.escaped;
+    counted += own.counted;
+  }
+  if (counted == 0) return {};
+  sum += scene.sky * (std::numbers::pi * static_cast<double>(escaped));
+
+  // Add what the lights send straight.
+  Vec3 direct;
+  out.light_rays +=
+      scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light, std::span(&direct, 1));
+  return sum / static_cast<double>(counted) + direct;
+}
+
+/// Leaves all parts out but the darkest of those that are large enough to be measured.
+void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+  const std::vector<std::uint32_t> sizes = Parting(scene, scratch).find_parts();
+  if (sizes.size() <= 1) return;
+  const std::vector<std::uint8_t> is_buried = scratch.is_out;
+  const auto keep = [&](std::uint32_t part) {
+    for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+      scratch.is_out[s] = is_buried[s] || scratch.part[s] != part;
+    }
+  };
+  auto kept = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t part = 0; part < sizes.size(); ++part) {
+    if (sizes[part] < kMinVisibleShare * static_cast<double>(scratch.sites.size())) continue;
+    keep(part);
+    const double light = mean_component(irradiance_of(scene, light_seed, scratch, out));
+    if (light >= least) continue;
+    least = light;
+    kept = part;
+  }
+  keep(kept);
+}
+
 /// Traces the sites' rows and marks what does not count. Returns the share that does.
 double trace_and_sort_out(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
                           ReceiveScratch& scratch, Reception& out) {
@@ -131,7 +176,7 @@ double trace_and_sort_out(const GatherScene& scene, std::uint64_t rays_seed, std
   out.rays += scratch.row.traced;
   scratch.is_out = scratch.row.is_buried;
   leave_out_sealed(scene, light_seed, scratch, out);
-  Parting(scene, scratch).keep_largest();
+  keep_darkest_part(scene, light_seed, scratch, out);
   const auto num_out = std::count(scratch.is_out.begin(), scratch.is_out.end(), 1);
   return 1 - static_cast<double>(num_out) / static_cast<double>(scratch.sites.size());
 }
@@ -158,27 +203,7 @@ Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64
     trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
   }
 
-  // Gather what the patches reflect, and the sky.
-  Vec3 sum;
-  std::uint64_t escaped = 0, counted = 0;
-  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
-    if (scratch.is_out[s]) continue;
-    const RowSample::SiteRays& own = scratch.row.of_site[s];
-    for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
-      sum += scene.radiosity[scratch.row.arrivals[own.first_arrival + k]];
-    }
-    escaped += own.escaped;
-    counted += own.counted;
-  }
-  if (counted == 0) return out;
-  sum += scene.sky * (std::numbers::pi * static_cast<double>(escaped));
-  out.irradiance = sum / static_cast<double>(counted);
-
-  // Add what the lights send straight.
-  Vec3 direct;
-  out.light_rays +=
-      scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light, std::span(&direct, 1));
-  out.irradiance += direct;
+  out.irradiance = irradiance_of(scene, light_seed, scratch, out);
   out.is_buried = false;
   return out;
 }

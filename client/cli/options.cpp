@@ -194,9 +194,8 @@ class Parser {
     sub->add_option(
            "--texels-per-meter", bake.texels_per_meter,
            "Density of the lightmap; an object's own factor on it is radbake_texel_density in the extras of its "
-           "node or mesh")
+           "node or mesh; default: 32, or less, with a warning, where the scene is too large for that")
         ->check(check_density, "")
-        ->capture_default_str()
         ->type_name("D");
     sub->add_option("--atlas-size", bake.atlas_size,
                     "Size of a lightmap's sheet: texels along a side, a power of two from 64 to 4096; where one is "

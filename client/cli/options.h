@@ -17,7 +17,7 @@ enum class Command { kSubmit, kList, kWatch, kCancel, kDownload, kCapabilities }
 /// What decides a bake. Zero means: the server's default.
 struct BakeChoices {
   std::uint32_t atlas_size = 0;
-  double texels_per_meter = 32;
+  double texels_per_meter = 0;
   v1::LightmapUv lightmap_uv = v1::LIGHTMAP_UV_AUTO;
   v1::Output output = v1::OUTPUT_LIGHTMAP;
   std::uint32_t rays = 0;

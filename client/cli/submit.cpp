@@ -72,7 +72,7 @@ Result<Prepared> prepare(const CommandContext& context, Stopwatch& stages) {
   context.reporter.stage("encoding", -1);
   EncodeOptions encoding;
   encoding.atlas_size = static_cast<int>(line.bake.atlas_size);
-  encoding.texels_per_meter = line.bake.texels_per_meter;
+  if (line.bake.texels_per_meter > 0) encoding.texels_per_meter = line.bake.texels_per_meter;
   RADBAKE_ASSIGN_OR_RETURN(EncodedScene encoded, encode_scene(read.scene, encoding));
   report.mesh_transfer = encoded.transfer;
   RADBAKE_ASSIGN_OR_RETURN(BakedScene kept, keep_for_writing(line.scene, std::move(read), encoded));

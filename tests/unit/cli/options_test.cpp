@@ -97,7 +97,7 @@ TEST_F(Options, LeavesToTheServerWhatIsNotChosen) {
   EXPECT_EQ(bake.max_patches, 0u);
   EXPECT_EQ(bake.threads, 0u);
   EXPECT_EQ(bake.max_reflectance, 0.98);
-  EXPECT_EQ(bake.texels_per_meter, 32);
+  EXPECT_EQ(bake.texels_per_meter, 0);
   EXPECT_EQ(bake.lightmap_uv, v1::LIGHTMAP_UV_AUTO);
   EXPECT_EQ(bake.output, v1::OUTPUT_LIGHTMAP);
   EXPECT_FALSE(bake.sky.has_value());

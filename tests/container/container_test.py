@@ -9,6 +9,7 @@ this checkout (build/release) is not compiled again.
 
 Exit code 77: skipped, and the last line says why.
 """
+import contextlib
 import filecmp
 import fcntl
 import json
@@ -78,7 +79,7 @@ def make_base_tarball():
 
 def open_buildah():
     """buildah with the base image, on the first storage driver that this machine allows."""
-    for program in ("buildah", "mmdebstrap"):
+    for program in ("buildah", "mmdebstrap", "ccache"):
         if not shutil.which(program):
             raise Unavailable(f"there is no {program}: deploy/install-packages container")
     if os.geteuid() != 0:
@@ -101,21 +102,34 @@ def open_buildah():
     raise Unavailable(f"this machine refuses containers: {refusal}")
 
 
+def ccache_of_this_machine():
+    """-> the folder of what it has compiled, and a file of the settings that decide what is found there"""
+    def setting(key):
+        return subprocess.run(["ccache", "-k", key], check=True, capture_output=True, text=True).stdout.strip()
+    cache, settings = pathlib.Path(setting("cache_dir")), WORK / "ccache.conf"
+    cache.mkdir(parents=True, exist_ok=True)
+    keys = ("base_dir", "hash_dir", "sloppiness", "compiler_check")
+    settings.write_text("".join(f"{key} = {setting(key)}\n" for key in keys))
+    return cache, settings
+
+
 def build_image(buildah):
     """Runs deploy/Dockerfile as it is. -> its configuration"""
     packages = WORK / "packages"
     packages.mkdir(exist_ok=True)
-    compiled = subprocess.run(["ccache", "-k", "cache_dir"], capture_output=True, text=True).stdout.strip()
-    compiled = pathlib.Path(compiled or WORK / "ccache")
-    compiled.mkdir(parents=True, exist_ok=True)
+    cache, settings = ccache_of_this_machine()
     log = WORK / "build.log"
     with open(log, "w") as out:
         build = buildah.popen(
             "bud", "--pull=never", "--format", "docker", "--layers", "--build-arg", f"SOURCE={ROOT}",
-            "--ignorefile", ROOT / "deploy/Dockerfile.dockerignore", "-v", f"{compiled}:/ccache",
-            "-v", f"{packages}:/var/cache/apt/archives", "-f", ROOT / "deploy/Dockerfile", "-t", IMAGE, ROOT,
+            *(["--build-arg", f"LANG={os.environ['LANG']}"] if "LANG" in os.environ else []),
+            "--ignorefile", ROOT / "deploy/Dockerfile.dockerignore", "-v", f"{cache}:/ccache",
+            "-v", f"{settings}:/etc/ccache.conf:ro", "-v", f"{packages}:/var/cache/apt/archives", "-f", ROOT / "deploy/Dockerfile", "-t", IMAGE, ROOT,
             stdout=out, stderr=subprocess.STDOUT)
-        code = build.wait(timeout=BUILD_LIMIT_SECONDS)
+        try:
+            code = build.wait(timeout=BUILD_LIMIT_SECONDS)
+        finally:
+            end_all(build)
     if code != 0:
         text = log.read_text()
         if UNREACHABLE.search(text):
@@ -138,6 +152,16 @@ def processes_below(pid):
         below = {child for child, (parent, _) in parents.items() if parent in below}
         found.update({child: parents[child][1] for child in below})
     return found
+
+
+def end_all(process):
+    """Ends a process that we started, and what it started; nothing where it has ended."""
+    if process.poll() is None:
+        for pid in processes_below(process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        process.kill()
+    process.wait()
 
 
 class Container(unittest.TestCase):
@@ -165,11 +189,7 @@ class Container(unittest.TestCase):
         return server, address[1]
 
     def end(self, server):
-        if server.poll() is None:
-            for pid in processes_below(server.pid):
-                os.kill(pid, signal.SIGKILL)
-            server.kill()
-        server.wait()
+        end_all(server)
         server.stdout.close()
 
     def tini_of(self, server):

@@ -40,6 +40,11 @@ def simple(name, write=None, mode=None, positions=STEP, indices=LIST, component=
     file.write(PLACE / f"{name}.gltf")
 
 
+def bounds(rows):
+    """What glTF asks of every POSITION."""
+    return {"min": [min(column) for column in zip(*rows)], "max": [max(column) for column in zip(*rows)]}
+
+
 def topologies():
     simple("list_uint16")
     simple("list_uint8", component=UBYTE)
@@ -57,17 +62,18 @@ def accessors():
     def strided(file, primitive):
         rows = [(*p, 9, 9, x, y) for p, (x, y) in zip(STEP, [(i / 8, 1 - i / 8) for i in range(6)])]
         view = file.view(packed(FLOAT, rows), stride=28)
-        for name, kind, offset in (("POSITION", "VEC3", 0), ("TEXCOORD_0", "VEC2", 20)):
+        for name, kind, offset, more in (("POSITION", "VEC3", 0, bounds(STEP)), ("TEXCOORD_0", "VEC2", 20, {})):
             primitive["attributes"][name] = file.add("accessors", {
-                "bufferView": view, "byteOffset": offset, "componentType": FLOAT, "type": kind, "count": 6})
+                "bufferView": view, "byteOffset": offset, "componentType": FLOAT, "type": kind, "count": 6, **more})
     simple("strided", strided)
 
     def offsets(file, primitive):
-        view = file.view(packed(FLOAT, [(7, 7, 7)] + STEP) + packed(USHORT, [9, 9] + LIST))
+        vertices, numbers = file.view(packed(FLOAT, [(7, 7, 7)] + STEP)), file.view(packed(USHORT, [9, 9] + LIST))
         primitive["attributes"]["POSITION"] = file.add("accessors", {
-            "bufferView": view, "byteOffset": 12, "componentType": FLOAT, "type": "VEC3", "count": 6})
+            "bufferView": vertices, "byteOffset": 12, "componentType": FLOAT, "type": "VEC3", "count": 6,
+            **bounds(STEP)})
         primitive["indices"] = file.add("accessors", {
-            "bufferView": view, "byteOffset": 12 * 7 + 4, "componentType": USHORT, "type": "SCALAR", "count": 12})
+            "bufferView": numbers, "byteOffset": 4, "componentType": USHORT, "type": "SCALAR", "count": 12})
     simple("byte_offsets", offsets)
 
     def sparse(accessor, file, component, numbers, values):
@@ -76,6 +82,7 @@ def accessors():
                               "values": {"bufferView": file.view(values)}}
 
     def sparse_positions(file, primitive):
+        file.json["accessors"][0].update(bounds(STEP))
         sparse(file.json["accessors"][0], file, UBYTE, [1, 5], packed(FLOAT, [STEP[1], STEP[5]]))
     wrong = list(STEP)
     wrong[1], wrong[5] = (8, 8, 8), (9, 9, 9)
@@ -190,7 +197,8 @@ def materials():
     def material(**more):
         def write(file, primitive):
             file.json["materials"][0].update(more)
-            file.json.setdefault("extensionsUsed", []).extend(more.get("extensions", {}))
+            if "extensions" in more:
+                file.json.setdefault("extensionsUsed", []).extend(more["extensions"])
         return write
     simple("alpha_mask", material(alphaMode="MASK", alphaCutoff=0.25, doubleSided=True))
     simple("alpha_blend", material(alphaMode="BLEND"))

@@ -46,9 +46,8 @@ struct ReceiveScratch {
 ///
 /// A site does not count where it is buried: inside a single-sided object, or inside a closed object of any kind that
 /// no light enters (the ground under a box that stands on it). Where something thin stands across the receiver, only
-/// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side of
-/// a wall, or a mean of both, would be a leak.
-/// `rays_seed`, `light_seed`: what the receiver is.
+/// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
+/// of a wall, or a mean of both, would be a leak. `rays_seed`, `light_seed`: what the receiver is.
 Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch);
 
 }  // namespace radbake::radiosity

@@ -10,12 +10,19 @@
 namespace radbake::radiosity {
 
 /// The form factors between patches, as an operator: geometry only, so another light needs no new rays.
+///
+/// Rows serve gathering, columns shooting; both are of one matrix: F_ij of row(i) and of column(j) are equal bits.
 class TransportOperator {
  public:
   virtual ~TransportOperator() = default;
 
   /// A row F_i*: patches and form factors, ascending. Replaces what the vectors hold.
   virtual void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const = 0;
+
+  /// A column F_*j: what patch j sends to each, as the share of light that the receivers send to j. Ascending by
+  /// receiver; replaces what the vectors hold. Where the matrix is reciprocal, F_ij = A_j F_ji / A_i.
+  virtual void column(std::uint32_t j, std::vector<std::uint32_t>& patches,
+                      std::vector<double>& form_factors) const = 0;
 
   /// H_i = sum_j F_ij B_j for one patch. Shapes: radiosity [n].
   virtual Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const = 0;
@@ -28,6 +35,10 @@ class TransportOperator {
 
   /// Areas of the patches, as far as they are visible; A_i F_ij = A_j F_ji. Shapes: [n].
   virtual std::span<const double> areas() const = 0;
+
+  /// H = F B for all patches, rows side by side on the threads; each row is gather_at's, bit for bit.
+  /// Shapes: both [n], not the same array.
+  void gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const;
 
   std::size_t size() const { return areas().size(); }
 };

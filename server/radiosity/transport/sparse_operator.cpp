@@ -161,13 +161,32 @@ void SparseOperator::restore_row_sums(const SampledRows& rows) {
   repair_.repaired_row_error_max = worst;
 }
 
+SparseOperator::ExchangeRow SparseOperator::exchange_row(std::uint32_t i) const {
+  const std::uint64_t length = first_[i + 1] - first_[i];
+  return {std::span(patches_).subspan(first_[i], length), std::span(exchange_).subspan(first_[i], length)};
+}
+
 void SparseOperator::row(std::uint32_t i, std::vector<std::uint32_t>& patches,
                          std::vector<double>& form_factors) const {
-  patches.assign(patches_.begin() + static_cast<std::ptrdiff_t>(first_[i]),
-                 patches_.begin() + static_cast<std::ptrdiff_t>(first_[i + 1]));
+  const ExchangeRow entries = exchange_row(i);
+  patches.assign(entries.patches.begin(), entries.patches.end());
   form_factors.clear();
-  for (std::uint64_t k = first_[i]; k < first_[i + 1]; ++k) {
-    form_factors.push_back(scale_[i] * scale_[patches_[k]] * exchange_[k] / areas_[i]);
+  for (std::size_t k = 0; k < patches.size(); ++k) {
+    const double exchange = scale_[i] * scale_[patches[k]] * entries.exchange[k];
+    form_factors.push_back(areas_[i] > 0 ? exchange / areas_[i] : 0);
+  }
+}
+
+void SparseOperator::column(std::uint32_t j, std::vector<std::uint32_t>& patches,
+                            std::vector<double>& form_factors) const {
+  // S is symmetric, so column j has the entries of row j: F_ij = d_i S_ji d_j / A_i.
+  const ExchangeRow entries = exchange_row(j);
+  patches.assign(entries.patches.begin(), entries.patches.end());
+  form_factors.clear();
+  for (std::size_t k = 0; k < patches.size(); ++k) {
+    const std::uint32_t i = patches[k];
+    const double exchange = scale_[i] * scale_[j] * entries.exchange[k];
+    form_factors.push_back(areas_[i] > 0 ? exchange / areas_[i] : 0);
   }
 }
 

@@ -36,7 +36,17 @@ class SparseOperator final : public TransportOperator {
 
   const TransportRepair& repair() const { return repair_; }
 
+  /// S_ij of one row: patches and exchange areas before the scaling, ascending. Symmetric, bit for bit.
+  struct ExchangeRow {
+    std::span<const std::uint32_t> patches;
+    std::span<const float> exchange;
+  };
+  ExchangeRow exchange_row(std::uint32_t i) const;
+  /// d of F_ij = d_i S_ij d_j / A_i. Shapes: [n].
+  std::span<const double> scaling() const { return scale_; }
+
   void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
+  void column(std::uint32_t j, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
   Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override;
   double row_sum(std::uint32_t i) const override;
   std::size_t row_length(std::uint32_t i) const override { return first_[i + 1] - first_[i]; }

@@ -1,0 +1,121 @@
+#include <cmath>
+
+#include "server/radiosity/solve/solve_monitor.h"
+
+namespace radbake::radiosity {
+namespace {
+
+/// Conjugate directions are started afresh after so many: rounding has spoilt them by then.
+constexpr int kMaxDirections = 200;
+/// And where the residual has grown so much: the operator is not reciprocal enough for them.
+constexpr double kMaxGrowth = 1e3;
+
+/// Conjugate gradients for the irradiance, from which B' = source + rho H:
+///
+///   (I - F rho) H = F source
+///
+/// The matrix is self-adjoint and positive definite in the inner product <u, v> = sum_i A_i rho_i u_i v_i, because
+/// A_i F_ij = A_j F_ji. In terms of H no patch is divided by its reflectance: one with rho_i = 0 has no weight, and its
+/// H_i is gathered along.
+class ConjugateGradients {
+ public:
+  explicit ConjugateGradients(SolveMonitor& monitor)
+      : transport_(monitor.transport()),
+        problem_(monitor.problem()),
+        reflected_(monitor.size()),
+        gathered_(monitor.size()) {}
+
+  /// Starts from H = irradiance, whose residual is gathered - irradiance, where gathered = F (source + rho H).
+  void start(std::span<const Vec3> irradiance, std::span<const Vec3> gathered) {
+    irradiance_.assign(irradiance.begin(), irradiance.end());
+    residual_.resize(irradiance.size());
+    for (std::size_t i = 0; i < irradiance.size(); ++i) residual_[i] = gathered[i] - irradiance[i];
+    direction_ = residual_;
+    square_ = inner(residual_, residual_);
+  }
+
+  /// One step, with the radiosity that belongs to it. Returns max|r| = max|rho h|.
+  double step(std::vector<Vec3>& radiosity) {
+    const std::size_t n = radiosity.size();
+    // q = (I - F rho) p
+    for (std::size_t i = 0; i < n; ++i) reflected_[i] = scaled_by(problem_.reflectance[i], direction_[i]);
+    transport_.gather(reflected_, gathered_);
+    for (std::size_t i = 0; i < n; ++i) gathered_[i] = direction_[i] - gathered_[i];
+    // H += alpha p, h -= alpha q with alpha = <h, h> / <p, q>; a channel that is solved, or where the operator shows
+    // itself indefinite, stays.
+    const Vec3 alpha = quotient(square_, inner(direction_, gathered_));
+    for (std::size_t i = 0; i < n; ++i) {
+      irradiance_[i] += scaled_by(alpha, direction_[i]);
+      residual_[i] -= scaled_by(alpha, gathered_[i]);
+      radiosity[i] = problem_.source[i] + scaled_by(problem_.reflectance[i], irradiance_[i]);
+      reflected_[i] = scaled_by(problem_.reflectance[i], residual_[i]);
+    }
+    // p = h + beta p with beta = <h, h> / <h, h> before.
+    const Vec3 square = inner(residual_, residual_), beta = quotient(square, square_);
+    for (std::size_t i = 0; i < n; ++i) direction_[i] = residual_[i] + scaled_by(beta, direction_[i]);
+    square_ = square;
+    return largest_component(reflected_);
+  }
+
+ private:
+  Vec3 inner(const std::vector<Vec3>& u, const std::vector<Vec3>& v) const {
+    Vec3 sum;
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      sum += scaled_by(problem_.reflectance[i], scaled_by(u[i], v[i])) * transport_.areas()[i];
+    }
+    return sum;
+  }
+  static Vec3 quotient(Vec3 a, Vec3 b) {
+    return {b.x > 0 ? a.x / b.x : 0, b.y > 0 ? a.y / b.y : 0, b.z > 0 ? a.z / b.z : 0};
+  }
+
+  const TransportOperator& transport_;
+  const RadiosityProblem& problem_;
+  std::vector<Vec3> irradiance_, residual_, direction_;
+  std::vector<Vec3> reflected_, gathered_;
+  Vec3 square_;
+};
+
+double flux_of(std::span<const double> areas, std::span<const Vec3> radiosity) {
+  double flux = 0;
+  for (std::size_t i = 0; i < areas.size(); ++i) flux += areas[i] * mean_component(radiosity[i]);
+  return flux;
+}
+
+/// Cycles of conjugate directions; Gauss-Seidel where one has not halved the bound.
+void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+  const auto n = static_cast<std::int64_t>(radiosity.size());
+  ConjugateGradients gradients(monitor);
+  std::vector<Vec3> irradiance;
+  if (!monitor.goes_on(radiosity)) return;
+  for (;;) {
+    const double bound_before = monitor.relative_error_bound();
+    // H = F B', and the radiosity that belongs to it: a step of Jacobi.
+    irradiance.assign(monitor.irradiance().begin(), monitor.irradiance().end());
+    for (std::size_t i = 0; i < radiosity.size(); ++i) {
+      radiosity[i] = monitor.problem().source[i] + scaled_by(monitor.problem().reflectance[i], irradiance[i]);
+    }
+    monitor.add_steps(1, 0);
+    if (!monitor.goes_on(radiosity)) return;
+    gradients.start(irradiance, monitor.irradiance());
+
+    const double first_residual = largest_component(monitor.residuals());
+    for (int k = 0; k < kMaxDirections; ++k) {
+      const double residual = gradients.step(radiosity);
+      monitor.add_steps(1, n);
+      if (residual == 0 || residual > kMaxGrowth * first_residual) break;
+      if (!monitor.needs_no_look(residual, flux_of(monitor.transport().areas(), radiosity), radiosity)) break;
+    }
+    if (!monitor.goes_on(radiosity)) return;
+    if (monitor.relative_error_bound() > bound_before / 2) return solve_by_gauss_seidel(monitor, radiosity);
+  }
+}
+
+}  // namespace
+
+void solve_by_krylov(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+  run_cycles(monitor, radiosity);
+  monitor.sharpen_bound();
+}
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,112 @@
+#include "server/radiosity/solve/solve.h"
+
+#include <algorithm>
+#include <string>
+
+#include "common/base/check.h"
+#include "server/radiosity/solve/solve_monitor.h"
+
+namespace radbake::radiosity {
+namespace {
+
+SolveReport run(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+                const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
+                std::stop_token stop) {
+  RADBAKE_CHECK_EQ(radiosity.size(), transport.size());
+  SolveMonitor monitor(solver, transport, problem, options, observe, std::move(stop));
+  std::vector<Vec3> unshot;
+  switch (solver) {
+    case Solver::kLu: solve_by_lu(monitor, radiosity); break;
+    case Solver::kJacobi: solve_by_jacobi(monitor, radiosity); break;
+    case Solver::kGaussSeidel: solve_by_gauss_seidel(monitor, radiosity); break;
+    case Solver::kSouthwell: solve_by_southwell(monitor, radiosity); break;
+    case Solver::kShooting: solve_by_shooting(monitor, radiosity, unshot); break;
+    case Solver::kKrylov: solve_by_krylov(monitor, radiosity); break;
+  }
+  SolveReport report = monitor.take_report();
+  report.unshot = std::move(unshot);
+  return report;
+}
+
+}  // namespace
+
+const char* solver_name(Solver solver) {
+  switch (solver) {
+    case Solver::kLu: return "lu";
+    case Solver::kJacobi: return "jacobi";
+    case Solver::kGaussSeidel: return "gauss-seidel";
+    case Solver::kSouthwell: return "southwell";
+    case Solver::kShooting: return "shooting";
+    case Solver::kKrylov: return "krylov";
+  }
+  return "unknown";
+}
+
+Result<Solver> solver_by_name(std::string_view name) {
+  std::string names;
+  for (const Solver solver : kAllSolvers) {
+    if (name == solver_name(solver)) return solver;
+    names += std::string(names.empty() ? "" : ", ") + solver_name(solver);
+  }
+  return invalid_argument("no solver is called '" + std::string(name) + "': choose one of " + names);
+}
+
+Solver default_solver(const RadiosityProblem& problem) {
+  constexpr double kManySweeps = 0.95;
+  const bool is_bright = std::any_of(problem.reflectance.begin(), problem.reflectance.end(),
+                                     [](const Vec3& rho) { return max_component(rho) > kManySweeps; });
+  return is_bright ? Solver::kKrylov : Solver::kGaussSeidel;
+}
+
+const char* solve_status_name(SolveStatus status) {
+  switch (status) {
+    case SolveStatus::kConverged: return "converged";
+    case SolveStatus::kIterationLimit: return "iteration_limit";
+    case SolveStatus::kTimeBudget: return "time_budget";
+    case SolveStatus::kDiverged: return "diverged";
+    case SolveStatus::kCancelled: return "cancelled";
+  }
+  return "unknown";
+}
+
+Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+                          const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
+                          std::stop_token stop) {
+  if (solver == Solver::kLu && transport.size() > options.max_lu_patches) {
+    return invalid_argument("solver 'lu' is for at most " + std::to_string(options.max_lu_patches) +
+                            " patches unless asked for by name; this scene has " + std::to_string(transport.size()));
+  }
+  return run(solver, transport, problem, options, radiosity, observe, std::move(stop));
+}
+
+SolveReport solve_gauss_seidel(const TransportOperator& transport, const RadiosityProblem& problem,
+                               const SolveOptions& options, std::vector<Vec3>& radiosity,
+                               const std::function<void(int, double)>& observe, std::stop_token stop) {
+  const SolveObserver after_each_sweep = [&observe](const SolveView& view) {
+    if (observe && view.step.steps > 0) observe(static_cast<int>(view.step.steps), view.step.relative_error_bound);
+  };
+  return run(Solver::kGaussSeidel, transport, problem, options, radiosity, after_each_sweep, std::move(stop));
+}
+
+std::vector<Vec3> ambient_display(std::span<const double> areas, std::span<const Vec3> reflectance,
+                                  std::span<const Vec3> radiosity, std::span<const Vec3> unshot) {
+  RADBAKE_CHECK_EQ(reflectance.size(), areas.size());
+  RADBAKE_CHECK_EQ(radiosity.size(), areas.size());
+  RADBAKE_CHECK_EQ(unshot.size(), areas.size());
+  std::vector<Vec3> shown(radiosity.begin(), radiosity.end());
+  double area = 0;
+  Vec3 reflecting, unshot_flux;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    area += areas[i];
+    reflecting += reflectance[i] * areas[i];
+    unshot_flux += unshot[i] * areas[i];
+  }
+  if (!(area > 0)) return shown;
+  // R sum A dB / sum A = sum A dB / sum A (1 - rho).
+  const Vec3 kept = Vec3{area, area, area} - reflecting;
+  const Vec3 ambient{unshot_flux.x / kept.x, unshot_flux.y / kept.y, unshot_flux.z / kept.z};
+  for (std::size_t i = 0; i < areas.size(); ++i) shown[i] += scaled_by(reflectance[i], ambient);
+  return shown;
+}
+
+}  // namespace radbake::radiosity

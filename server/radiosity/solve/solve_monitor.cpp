@@ -1,0 +1,187 @@
+#include "server/radiosity/solve/solve_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/check.h"
+#include "server/radiosity/threads/for_each_range.h"
+
+namespace radbake::radiosity {
+namespace {
+
+constexpr std::size_t kRowsPerTask = 256;
+constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kGrowthThatMeansDivergence = 1e6;
+
+bool steps_are_patches(Solver solver) { return solver == Solver::kSouthwell || solver == Solver::kShooting; }
+
+double largest_of(Vec3 v) {
+  return is_finite(v) ? std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}) : kInfinity;
+}
+
+}  // namespace
+
+double largest_component(std::span<const Vec3> values) {
+  double largest = 0;
+  for (const Vec3& v : values) largest = std::max(largest, largest_of(v));
+  return largest;
+}
+
+SolveMonitor::SolveMonitor(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+                           const SolveOptions& options, const SolveObserver& observe, std::stop_token stop)
+    : transport_(transport),
+      problem_(problem),
+      options_(options),
+      observe_(observe),
+      stop_(std::move(stop)),
+      start_(std::chrono::steady_clock::now()),
+      max_steps_(options.max_sweeps),
+      terms_(transport.size()),
+      residuals_(transport.size()),
+      irradiance_(transport.size()) {
+  RADBAKE_CHECK_EQ(problem.source.size(), transport.size());
+  RADBAKE_CHECK_EQ(problem.reflectance.size(), transport.size());
+  report_.solver = solver;
+  if (steps_are_patches(solver)) max_steps_ *= static_cast<std::int64_t>(transport.size());
+  // 1 - max_i rho_i (F1)_i: how far the system is from passing everything on.
+  double passed_on = 0;
+  for (std::uint32_t i = 0; i < transport.size(); ++i) {
+    passed_on = std::max(passed_on, max_component(problem.reflectance[i]) * transport.row_sum(i));
+    area_ += transport.areas()[i];
+  }
+  margin_ = 1 - passed_on;
+}
+
+double SolveMonitor::seconds() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+void SolveMonitor::add_steps(std::int64_t steps, std::int64_t work) {
+  report_.steps += steps;
+  report_.work += work;
+}
+
+bool SolveMonitor::look(std::span<const Vec3> radiosity) {
+  RADBAKE_CHECK_EQ(radiosity.size(), size());
+  for_each_range(size(), kRowsPerTask, [&](std::size_t begin, std::size_t end) {
+    if (stop_.stop_requested()) return;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto patch = static_cast<std::uint32_t>(i);
+      // r = source + rho F B' - B', and a bound on its own rounding: (n + 4) u times the sum of magnitudes.
+      irradiance_[i] = transport_.gather_at(patch, radiosity);
+      const Vec3 reflected = scaled_by(problem_.reflectance[i], irradiance_[i]);
+      residuals_[i] = problem_.source[i] + reflected - radiosity[i];
+      const Vec3 magnitude = problem_.source[i] + reflected + radiosity[i];
+      const double roundings = static_cast<double>(transport_.row_length(patch)) + 4;
+      terms_[i] = {largest_of(residuals_[i]), roundings * kRoundoff * max_component(magnitude)};
+    }
+  });
+  if (stop_.stop_requested()) return false;
+  report_.work += static_cast<std::int64_t>(size());
+
+  const auto areas = transport_.areas();
+  report_.residual = rounding_ = flux_ = 0;
+  for (std::size_t i = 0; i < size(); ++i) {
+    report_.residual = std::max(report_.residual, terms_[i].residual);
+    rounding_ = std::max(rounding_, terms_[i].rounding);
+    flux_ += areas[i] * mean_component(radiosity[i]);
+  }
+  const SolveStep now = step_of(report_.residual, flux_);
+  report_.error_bound = now.error_bound;
+  report_.relative_error_bound = now.relative_error_bound;
+  return true;
+}
+
+SolveStep SolveMonitor::step_of(double residual, double flux) const {
+  SolveStep step{report_.steps, report_.work, seconds(), residual, (residual + rounding_) / margin_, 0};
+  if (step.error_bound > 0) step.relative_error_bound = flux > 0 ? step.error_bound * area_ / flux : kInfinity;
+  return step;
+}
+
+void SolveMonitor::record(double residual, double flux, bool always, std::span<const Vec3> radiosity,
+                          std::span<const Vec3> unshot) {
+  if (!always && report_.steps < next_record_) return;
+  const SolveStep step = step_of(residual, flux);
+  // A look after steps that were recorded already says it better.
+  if (!report_.history.empty() && report_.history.back().steps == step.steps) report_.history.pop_back();
+  report_.history.push_back(step);
+  if (observe_) observe_({report_.history.back(), radiosity, unshot});
+  constexpr std::int64_t kRecordsToDoubleSteps = 50;
+  next_record_ = report_.steps + 1;
+  if (steps_are_patches(report_.solver)) next_record_ += report_.steps / kRecordsToDoubleSteps;
+}
+
+bool SolveMonitor::goes_on(std::span<const Vec3> radiosity, std::span<const Vec3> unshot) {
+  report_.status = SolveStatus::kDiverged;
+  if (!(margin_ > 0)) return false;
+  report_.status = SolveStatus::kCancelled;
+  if (is_cancelled() || !look(radiosity)) return false;
+  if (report_.history.empty()) first_residual_ = report_.residual + rounding_;
+  record(report_.residual, flux_, true, radiosity, unshot);
+
+  report_.status = SolveStatus::kConverged;
+  if (report_.relative_error_bound <= options_.relative_tolerance) return false;
+  report_.status = SolveStatus::kDiverged;
+  if (!std::isfinite(report_.error_bound) || report_.residual > kGrowthThatMeansDivergence * first_residual_) {
+    return false;
+  }
+  report_.status = SolveStatus::kCancelled;
+  if (is_cancelled()) return false;
+  report_.status = SolveStatus::kTimeBudget;
+  if (seconds() >= options_.time_budget_seconds) return false;
+  report_.status = SolveStatus::kIterationLimit;
+  return !are_steps_used_up();
+}
+
+bool SolveMonitor::needs_no_look(double residual, double flux, std::span<const Vec3> radiosity,
+                                 std::span<const Vec3> unshot) {
+  record(residual, flux, false, radiosity, unshot);
+  const double bound = (residual + rounding_) / margin_;
+  return std::isfinite(bound) && !(flux > 0 && bound * area_ <= options_.relative_tolerance * flux) &&
+         !is_cancelled() && seconds() < options_.time_budget_seconds && !are_steps_used_up();
+}
+
+void SolveMonitor::end_without_progress() {
+  report_.status = is_cancelled() ? SolveStatus::kCancelled : SolveStatus::kIterationLimit;
+}
+
+void SolveMonitor::sharpen_bound() {
+  const bool is_bounded = margin_ > 0 && std::isfinite(report_.error_bound) &&
+                          report_.status != SolveStatus::kCancelled && report_.status != SolveStatus::kDiverged;
+  // Above this margin the plain bound is at most (2 - margin) / margin < 100 x the error.
+  constexpr double kMarginThatSuffices = 0.02;
+  if (!is_bounded || margin_ >= kMarginThatSuffices) return;
+  std::size_t longest_row = 0;
+  for (std::uint32_t i = 0; i < size(); ++i) longest_row = std::max(longest_row, transport_.row_length(i));
+
+  std::vector<Vec3> term(residuals_), sum(residuals_);
+  double rounding = rounding_, magnitudes = report_.residual;
+  constexpr int kMaxTerms = 50;
+  for (int k = 1; k <= kMaxTerms && !is_cancelled(); ++k) {
+    // (rho F)^k r, and the rounding that it adds.
+    rounding += (static_cast<double>(longest_row) + 4) * kRoundoff * largest_component(term);
+    transport_.gather(term, irradiance_);
+    report_.work += static_cast<std::int64_t>(size());
+    for (std::size_t i = 0; i < size(); ++i) term[i] = scaled_by(problem_.reflectance[i], irradiance_[i]);
+    const double rest = (largest_component(term) + rounding) / margin_, known = largest_component(sum);
+    const double sharp = known + k * kRoundoff * magnitudes + rest;
+    if (sharp < report_.error_bound) {
+      report_.error_bound = sharp;
+      report_.relative_error_bound = flux_ > 0 ? sharp * area_ / flux_ : kInfinity;
+    }
+    if (rest <= known / 2 || largest_component(term) <= rounding) break;
+    for (std::size_t i = 0; i < size(); ++i) sum[i] += term[i];
+    magnitudes += largest_component(term);
+  }
+  if (report_.relative_error_bound <= options_.relative_tolerance) report_.status = SolveStatus::kConverged;
+}
+
+SolveReport SolveMonitor::take_report() {
+  const auto n = static_cast<std::int64_t>(std::max<std::size_t>(size(), 1));
+  report_.sweeps = static_cast<int>(steps_are_patches(report_.solver) ? report_.steps / n : report_.steps);
+  report_.seconds = seconds();
+  return std::move(report_);
+}
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <chrono>
+
+#include "server/radiosity/solve/solve.h"
+
+namespace radbake::radiosity {
+
+/// What all solvers share: the look at residual and bound, the stop criteria, and the report.
+///
+/// A solver is a loop `while (monitor.goes_on(B)) { take a step; monitor.add_steps(...); }`. Solvers that carry the
+/// residual along take many steps between two looks, and ask needs_no_look() after each.
+class SolveMonitor {
+ public:
+  SolveMonitor(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+               const SolveOptions& options, const SolveObserver& observe, std::stop_token stop);
+
+  const TransportOperator& transport() const { return transport_; }
+  const RadiosityProblem& problem() const { return problem_; }
+  std::size_t size() const { return terms_.size(); }
+
+  /// Counts steps and the rows or columns that they read.
+  void add_steps(std::int64_t steps, std::int64_t work);
+
+  /// Reads all rows for the true residual and the bound, and records them. False: the solve ends, with its status.
+  bool goes_on(std::span<const Vec3> radiosity, std::span<const Vec3> unshot = {});
+
+  /// Records a residual that the solver carries along. False where a true look is due: it suffices for the tolerance,
+  /// is not finite, or steps or time are used up; or where the solve was cancelled, which the next goes_on() finds.
+  /// Shapes: flux = sum_i A_i mean_component(B_i).
+  bool needs_no_look(double residual, double flux, std::span<const Vec3> radiosity, std::span<const Vec3> unshot = {});
+
+  bool is_cancelled() const { return stop_.stop_requested(); }
+
+  /// Ends a solve that no step changes any more, or that was cancelled within one.
+  void end_without_progress();
+
+  /// Of the last look: r = source + rho F B - B, and F B.
+  std::span<const Vec3> residuals() const { return residuals_; }
+  std::span<const Vec3> irradiance() const { return irradiance_; }
+  double flux() const { return flux_; }
+  double relative_error_bound() const { return report_.relative_error_bound; }
+  std::int64_t steps() const { return report_.steps; }
+  /// 1 - max_i rho_i (F1)_i
+  double margin() const { return margin_; }
+
+  /// Sharpens the bound of the last look: (I - rho F)^-1 = sum_m (rho F)^m, its first k terms summed with their signs,
+  ///
+  ///   max|B' - exact| <= max|sum_(m<k) (rho F)^m r| + (max|(rho F)^k r| + rounding) / (1 - max_i rho_i (F1)_i)
+  ///
+  /// until the rest is half of the sum: then the bound is at most 3 x the error. Wanted where residuals change sign
+  /// from patch to patch, as those of Krylov methods do: the plain bound is then up to 1/(1 - rho) too large.
+  void sharpen_bound();
+
+  SolveReport take_report();
+
+ private:
+  struct Term {
+    double residual, rounding;
+  };
+  bool look(std::span<const Vec3> radiosity);
+  void record(double residual, double flux, bool always, std::span<const Vec3> radiosity, std::span<const Vec3> unshot);
+  SolveStep step_of(double residual, double flux) const;
+  double seconds() const;
+  bool are_steps_used_up() const { return report_.steps >= max_steps_; }
+
+  const TransportOperator& transport_;
+  const RadiosityProblem& problem_;
+  const SolveOptions& options_;
+  const SolveObserver& observe_;
+  std::stop_token stop_;
+  std::chrono::steady_clock::time_point start_;
+  SolveReport report_;
+  std::int64_t max_steps_ = 0;
+  std::int64_t next_record_ = 0;
+  std::vector<Term> terms_;
+  std::vector<Vec3> residuals_, irradiance_;
+  double margin_ = 0, rounding_ = 0, area_ = 0, flux_ = 0;
+  double first_residual_ = 0;
+};
+
+/// max |component| of the vectors; infinity where one is not finite, which a maximum would pass over.
+double largest_component(std::span<const Vec3> values);
+
+// The solvers; each leaves its last state in radiosity.
+void solve_by_lu(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
+void solve_by_jacobi(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
+void solve_by_gauss_seidel(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
+void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
+void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std::vector<Vec3>& unshot);
+void solve_by_krylov(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
+
+}  // namespace radbake::radiosity

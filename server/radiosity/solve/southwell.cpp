@@ -1,0 +1,70 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "server/radiosity/solve/largest_key.h"
+#include "server/radiosity/solve/solve_monitor.h"
+
+namespace radbake::radiosity {
+namespace {
+
+/// After so many sweeps' worth of steps the residual that is carried along is replaced by the true one.
+constexpr std::size_t kSweepsBetweenLooks = 8;
+
+}  // namespace
+
+void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+  const TransportOperator& transport = monitor.transport();
+  const RadiosityProblem& problem = monitor.problem();
+  const std::size_t n = radiosity.size();
+  std::optional<LargestKey> largest;
+  std::vector<std::uint32_t> patches(n);
+  std::vector<double> form_factors, keys(n);
+  std::vector<Vec3> residuals;
+
+  while (monitor.goes_on(radiosity)) {
+    if (!largest) largest.emplace(n);
+    residuals.assign(monitor.residuals().begin(), monitor.residuals().end());
+    double flux = monitor.flux();
+    patches.resize(n);
+    std::iota(patches.begin(), patches.end(), 0u);
+    keys.resize(n);
+    for (std::size_t i = 0; i < n; ++i) keys[i] = largest_component(std::span(&residuals[i], 1));
+    largest->set(patches, keys);
+
+    for (std::size_t steps = 0; steps < kSweepsBetweenLooks * n && !monitor.is_cancelled(); ++steps) {
+      const std::uint32_t i = largest->largest();
+      if (largest->key(i) == 0) {
+        if (steps == 0) return monitor.end_without_progress();
+        break;
+      }
+      transport.column(i, patches, form_factors);
+      const auto own = std::lower_bound(patches.begin(), patches.end(), i);
+      const double own_factor = own != patches.end() && *own == i ? form_factors[own - patches.begin()] : 0;
+
+      // Make equation i hold: dB_i = r_i / (1 - rho_i F_ii), and r_j += rho_j F_ji dB_i for all others.
+      const Vec3 rho = problem.reflectance[i], r = residuals[i];
+      const Vec3 change{r.x / (1 - rho.x * own_factor), r.y / (1 - rho.y * own_factor), r.z / (1 - rho.z * own_factor)};
+      radiosity[i] += change;
+      flux += transport.areas()[i] * mean_component(change);
+      keys.resize(patches.size());
+      for (std::size_t k = 0; k < patches.size(); ++k) {
+        const std::uint32_t j = patches[k];
+        residuals[j] = j == i ? Vec3{} : residuals[j] + scaled_by(problem.reflectance[j], change * form_factors[k]);
+        keys[k] = largest_component(std::span(&residuals[j], 1));
+      }
+      largest->set(patches, keys);
+      if (own_factor == 0) {
+        // The patch does not see itself, so its column may leave it out.
+        constexpr double kNone = 0;
+        residuals[i] = {};
+        largest->set(std::span(&i, 1), std::span(&kNone, 1));
+      }
+      monitor.add_steps(1, 1);
+      if (!monitor.needs_no_look(largest->key(largest->largest()), flux, radiosity)) break;
+    }
+  }
+}
+
+}  // namespace radbake::radiosity

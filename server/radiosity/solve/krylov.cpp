@@ -20,7 +20,8 @@ constexpr double kMaxGrowth = 1e3;
 class ConjugateGradients {
  public:
   explicit ConjugateGradients(SolveMonitor& monitor)
-      : transport_(monitor.transport()),
+      : monitor_(monitor),
+        transport_(monitor.transport()),
         problem_(monitor.problem()),
         reflected_(monitor.size()),
         gathered_(monitor.size()) {}
@@ -34,12 +35,13 @@ class ConjugateGradients {
     square_ = inner(residual_, residual_);
   }
 
-  /// One step, with the radiosity that belongs to it. Returns max|r| = max|rho h|.
+  /// One step, with the radiosity that belongs to it. Returns max|r| = max|rho h|; infinity where it was cancelled.
   double step(std::vector<Vec3>& radiosity) {
     const std::size_t n = radiosity.size();
     // q = (I - F rho) p
     for (std::size_t i = 0; i < n; ++i) reflected_[i] = scaled_by(problem_.reflectance[i], direction_[i]);
-    transport_.gather(reflected_, gathered_);
+    if (!monitor_.gather(reflected_, gathered_)) return std::numeric_limits<double>::infinity();
+    monitor_.add_steps(1, 0);
     for (std::size_t i = 0; i < n; ++i) gathered_[i] = direction_[i] - gathered_[i];
     // H += alpha p, h -= alpha q with alpha = <h, h> / <p, q>; a channel that is solved, or where the operator shows
     // itself indefinite, stays.
@@ -69,6 +71,7 @@ class ConjugateGradients {
     return {b.x > 0 ? a.x / b.x : 0, b.y > 0 ? a.y / b.y : 0, b.z > 0 ? a.z / b.z : 0};
   }
 
+  SolveMonitor& monitor_;
   const TransportOperator& transport_;
   const RadiosityProblem& problem_;
   std::vector<Vec3> irradiance_, residual_, direction_;
@@ -84,7 +87,6 @@ double flux_of(std::span<const double> areas, std::span<const Vec3> radiosity) {
 
 /// Cycles of conjugate directions; Gauss-Seidel where one has not halved the bound.
 void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
-  const auto n = static_cast<std::int64_t>(radiosity.size());
   ConjugateGradients gradients(monitor);
   std::vector<Vec3> irradiance;
   if (!monitor.goes_on(radiosity)) return;
@@ -102,7 +104,6 @@ void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
     const double first_residual = largest_component(monitor.residuals());
     for (int k = 0; k < kMaxDirections; ++k) {
       const double residual = gradients.step(radiosity);
-      monitor.add_steps(1, n);
       if (residual == 0 || residual > kMaxGrowth * first_residual) break;
       if (!monitor.needs_no_look(residual, flux_of(monitor.transport().areas(), radiosity), radiosity)) break;
     }

@@ -1,40 +1,43 @@
 #include "server/radiosity/solve/largest_key.h"
 
-#include <bit>
-#include <limits>
+#include <algorithm>
 
 #include "common/base/check.h"
 
 namespace radbake::radiosity {
+namespace {
+
+constexpr std::size_t kBlock = 32;
+constexpr double kPadding = -1;  // below every key
+
+}  // namespace
 
 LargestKey::LargestKey(std::size_t n)
-    : num_leaves_(std::bit_ceil(n)),
-      keys_(num_leaves_, -std::numeric_limits<double>::infinity()),
-      winners_(2 * num_leaves_, 0) {
+    : keys_((n + kBlock - 1) / kBlock * kBlock, kPadding), maxima_(keys_.size() / kBlock, 0) {
   RADBAKE_CHECK_LT(std::size_t{0}, n);
-  for (std::size_t i = 0; i < n; ++i) keys_[i] = 0;
-  for (std::size_t i = 0; i < num_leaves_; ++i) winners_[num_leaves_ + i] = static_cast<std::uint32_t>(i);
-  for (std::size_t node = num_leaves_ - 1; node > 0; --node) winners_[node] = winners_[2 * node];
+  std::fill_n(keys_.begin(), n, 0.0);
+}
+
+std::uint32_t LargestKey::largest() const {
+  // max_element gives the first of equals.
+  const auto block = std::max_element(maxima_.begin(), maxima_.end()) - maxima_.begin();
+  const auto first = keys_.begin() + block * static_cast<std::ptrdiff_t>(kBlock);
+  const auto found = std::max_element(first, first + static_cast<std::ptrdiff_t>(kBlock));
+  return static_cast<std::uint32_t>(found - keys_.begin());
 }
 
 void LargestKey::set(std::span<const std::uint32_t> indices, std::span<const double> keys) {
   RADBAKE_CHECK_EQ(indices.size(), keys.size());
-  changed_.clear();
-  for (std::size_t k = 0; k < indices.size(); ++k) {
-    keys_[indices[k]] = keys[k];
-    changed_.push_back(static_cast<std::uint32_t>(num_leaves_ + indices[k]));
-  }
-  // Level by level towards the root; neighbours share a parent, which is played once.
-  while (!changed_.empty() && changed_.front() > 1) {
-    std::size_t num_parents = 0;
-    for (const std::uint32_t node : changed_) {
-      const std::uint32_t parent = node / 2;
-      if (num_parents > 0 && changed_[num_parents - 1] == parent) continue;
-      const std::uint32_t left = winners_[2 * parent], right = winners_[2 * parent + 1];
-      winners_[parent] = keys_[left] >= keys_[right] ? left : right;
-      changed_[num_parents++] = parent;
+  for (std::size_t k = 0; k < indices.size();) {
+    const std::size_t block = indices[k] / kBlock;
+    for (; k < indices.size() && indices[k] / kBlock == block; ++k) keys_[indices[k]] = keys[k];
+    // Four chains, as a maximum has to wait for the one before.
+    const double* key = keys_.data() + block * kBlock;
+    double best[4] = {key[0], key[1], key[2], key[3]};
+    for (std::size_t i = 4; i < kBlock; i += 4) {
+      for (std::size_t chain = 0; chain < 4; ++chain) best[chain] = std::max(best[chain], key[i + chain]);
     }
-    changed_.resize(num_parents);
+    maxima_[block] = std::max(std::max(best[0], best[1]), std::max(best[2], best[3]));
   }
 }
 

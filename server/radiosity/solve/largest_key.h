@@ -6,26 +6,25 @@
 
 namespace radbake::radiosity {
 
-/// Which of n numbers is the largest, the smallest index among equals, while some of them change.
+/// Which of n numbers is the largest, the smallest index among equals, while many of them change at a time.
 ///
-/// A tournament: each node of a binary tree holds the winner of its two children. Cost: O(n) memory; O(1) to ask;
-/// O(min(n, k log n)) to change k numbers.
+/// Blocks of 32 neighbours keep their maxima, so what did not change is looked at a block at a time. A tree would do
+/// better for a few changes; a column of form factors touches nearly every block.
+/// Cost: O(n / 32) to ask; O(32 k), at most O(n), to change k numbers.
 class LargestKey {
  public:
   /// All keys are 0. Precondition: n > 0.
   explicit LargestKey(std::size_t n);
 
-  std::uint32_t largest() const { return winners_[1]; }
+  std::uint32_t largest() const;
   double key(std::uint32_t i) const { return keys_[i]; }
 
-  /// Preconditions: indices ascending, each below n; keys are not NaN.
+  /// Preconditions: indices ascending, each below n; keys >= 0, not NaN.
   void set(std::span<const std::uint32_t> indices, std::span<const double> keys);
 
  private:
-  std::size_t num_leaves_;
-  std::vector<double> keys_;            ///< padded with -infinity
-  std::vector<std::uint32_t> winners_;  ///< children of node k: 2k and 2k + 1; leaves: num_leaves_ + i
-  std::vector<std::uint32_t> changed_;  ///< nodes of one level
+  std::vector<double> keys_;  ///< padded with -1 to whole blocks
+  std::vector<double> maxima_;
 };
 
 }  // namespace radbake::radiosity

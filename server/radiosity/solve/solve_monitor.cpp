@@ -16,15 +16,11 @@ constexpr double kGrowthThatMeansDivergence = 1e6;
 
 bool steps_are_patches(Solver solver) { return solver == Solver::kSouthwell || solver == Solver::kShooting; }
 
-double largest_of(Vec3 v) {
-  return is_finite(v) ? std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}) : kInfinity;
-}
-
 }  // namespace
 
 double largest_component(std::span<const Vec3> values) {
   double largest = 0;
-  for (const Vec3& v : values) largest = std::max(largest, largest_of(v));
+  for (const Vec3& v : values) largest = std::max(largest, largest_component(v));
   return largest;
 }
 
@@ -74,7 +70,7 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
       residuals_[i] = problem_.source[i] + reflected - radiosity[i];
       const Vec3 magnitude = problem_.source[i] + reflected + radiosity[i];
       const double roundings = static_cast<double>(transport_.row_length(patch)) + 4;
-      terms_[i] = {largest_of(residuals_[i]), roundings * kRoundoff * max_component(magnitude)};
+      terms_[i] = {largest_component(residuals_[i]), roundings * kRoundoff * max_component(magnitude)};
     }
   });
   if (stop_.stop_requested()) return false;
@@ -91,6 +87,17 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
   report_.error_bound = now.error_bound;
   report_.relative_error_bound = now.relative_error_bound;
   return true;
+}
+
+bool SolveMonitor::gather(std::span<const Vec3> values, std::span<Vec3> gathered) {
+  for_each_range(size(), kRowsPerTask, [&](std::size_t begin, std::size_t end) {
+    if (stop_.stop_requested()) return;
+    for (std::size_t i = begin; i < end; ++i) {
+      gathered[i] = transport_.gather_at(static_cast<std::uint32_t>(i), values);
+    }
+  });
+  report_.work += static_cast<std::int64_t>(size());
+  return !stop_.stop_requested();
 }
 
 SolveStep SolveMonitor::step_of(double residual, double flux) const {
@@ -158,11 +165,10 @@ void SolveMonitor::sharpen_bound() {
   std::vector<Vec3> term(residuals_), sum(residuals_);
   double rounding = rounding_, magnitudes = report_.residual;
   constexpr int kMaxTerms = 50;
-  for (int k = 1; k <= kMaxTerms && !is_cancelled(); ++k) {
+  for (int k = 1; k <= kMaxTerms; ++k) {
     // (rho F)^k r, and the rounding that it adds.
     rounding += (static_cast<double>(longest_row) + 4) * kRoundoff * largest_component(term);
-    transport_.gather(term, irradiance_);
-    report_.work += static_cast<std::int64_t>(size());
+    if (!gather(term, irradiance_)) break;
     for (std::size_t i = 0; i < size(); ++i) term[i] = scaled_by(problem_.reflectance[i], irradiance_[i]);
     const double rest = (largest_component(term) + rounding) / margin_, known = largest_component(sum);
     const double sharp = known + k * kRoundoff * magnitudes + rest;

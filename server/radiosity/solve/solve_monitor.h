@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 
 #include "server/radiosity/solve/solve.h"
 
@@ -29,6 +30,9 @@ class SolveMonitor {
   /// is not finite, or steps or time are used up; or where the solve was cancelled, which the next goes_on() finds.
   /// Shapes: flux = sum_i A_i mean_component(B_i).
   bool needs_no_look(double residual, double flux, std::span<const Vec3> radiosity, std::span<const Vec3> unshot = {});
+
+  /// F values, as TransportOperator::gather, and counts its rows. False where it was cancelled on the way.
+  bool gather(std::span<const Vec3> values, std::span<Vec3> gathered);
 
   bool is_cancelled() const { return stop_.stop_requested(); }
 
@@ -79,7 +83,11 @@ class SolveMonitor {
   double first_residual_ = 0;
 };
 
-/// max |component| of the vectors; infinity where one is not finite, which a maximum would pass over.
+/// max |component|; infinity where one is not finite, which a maximum would pass over.
+inline double largest_component(Vec3 v) {
+  const double largest = std::fmax(std::fabs(v.x), std::fmax(std::fabs(v.y), std::fabs(v.z)));
+  return is_finite(v) ? largest : std::numeric_limits<double>::infinity();
+}
 double largest_component(std::span<const Vec3> values);
 
 // The solvers; each leaves its last state in radiosity.

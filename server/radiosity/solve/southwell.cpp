@@ -30,7 +30,7 @@ void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
     patches.resize(n);
     std::iota(patches.begin(), patches.end(), 0u);
     keys.resize(n);
-    for (std::size_t i = 0; i < n; ++i) keys[i] = largest_component(std::span(&residuals[i], 1));
+    for (std::size_t i = 0; i < n; ++i) keys[i] = largest_component(residuals[i]);
     largest->set(patches, keys);
 
     for (std::size_t steps = 0; steps < kSweepsBetweenLooks * n && !monitor.is_cancelled(); ++steps) {
@@ -52,7 +52,7 @@ void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
       for (std::size_t k = 0; k < patches.size(); ++k) {
         const std::uint32_t j = patches[k];
         residuals[j] = j == i ? Vec3{} : residuals[j] + scaled_by(problem.reflectance[j], change * form_factors[k]);
-        keys[k] = largest_component(std::span(&residuals[j], 1));
+        keys[k] = largest_component(residuals[j]);
       }
       largest->set(patches, keys);
       if (own_factor == 0) {

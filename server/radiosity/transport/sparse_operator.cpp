@@ -182,11 +182,11 @@ void SparseOperator::column(std::uint32_t j, std::vector<std::uint32_t>& patches
   // S is symmetric, so column j has the entries of row j: F_ij = d_i S_ji d_j / A_i.
   const ExchangeRow entries = exchange_row(j);
   patches.assign(entries.patches.begin(), entries.patches.end());
-  form_factors.clear();
+  form_factors.resize(patches.size());
   for (std::size_t k = 0; k < patches.size(); ++k) {
     const std::uint32_t i = patches[k];
     const double exchange = scale_[i] * scale_[j] * entries.exchange[k];
-    form_factors.push_back(areas_[i] > 0 ? exchange / areas_[i] : 0);
+    form_factors[k] = areas_[i] > 0 ? exchange / areas_[i] : 0;
   }
 }
 

@@ -1,4 +1,4 @@
-#include "solve_cases.h"
+#include "tests/unit/radiosity/solve_cases.h"
 
 #include <algorithm>
 #include <cmath>

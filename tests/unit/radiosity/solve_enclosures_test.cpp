@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solve_cases.h"
+#include "tests/unit/radiosity/solve_cases.h"
 
 namespace radbake::radiosity {
 namespace {

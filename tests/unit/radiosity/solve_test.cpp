@@ -8,7 +8,7 @@
 #include <random>
 
 #include "server/radiosity/solve/largest_key.h"
-#include "solve_cases.h"
+#include "tests/unit/radiosity/solve_cases.h"
 
 namespace radbake::radiosity {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "server/radiosity/transport/dense_operator.h"
 #include "server/radiosity/transport/sparse_operator.h"
-#include "solve_cases.h"
+#include "tests/unit/radiosity/solve_cases.h"
 
 namespace radbake::radiosity {
 namespace {

@@ -37,7 +37,7 @@ bool is_far(const Piece& p, const Piece& q);
 ///   A F = int_outer 1/(2 pi) sum over visible parts, edges of gamma n.c/|c| dA
 ///
 /// Visible from a point: `inner` less the part in the pyramid over an occluder and behind its plane. The outer integral
-/// halves the triangle with the largest difference of two rules (7 and 16 points) until twice their sum is below the
+/// halves the triangle with the largest difference of two rules (7 and 16 points) until four times the sum is below the
 /// tolerance; it cuts along visibility events, the lines where the plane of an edge and a corner meets the outer one.
 /// Shapes: occluders [k], may be empty.
 /// Units:  tolerance in those of A F.

@@ -1,0 +1,81 @@
+// radbake-study: what the numeric library's methods cost and how exact they are.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <functional>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "common/base/version.h"
+#include "server/study/cases.h"
+#include "server/study/enclosure_study.h"
+#include "server/study/form_factor_study.h"
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kDone = 0, kUsage = 2, kBadInput = 3;
+
+struct Choices {
+  std::string cases;
+  double tolerance = 0;
+  std::string json;
+};
+
+/// Reads the cases, studies them, prints the table and writes the JSON.
+int run(const Choices& choices, const std::function<Json(const Json&, double)>& study,
+        const std::function<std::string(const Json&)>& table) {
+  const auto cases = radbake::study::read_cases(choices.cases);
+  if (!cases.ok()) {
+    std::cerr << "radbake-study: error: " << cases.error().message << '\n';
+    return kBadInput;
+  }
+  const Json result = study(*cases, choices.tolerance);
+  std::cout << table(result);
+  if (choices.json.empty()) return kDone;
+  const auto written = radbake::study::write_text(choices.json, result.dump(2) + "\n");
+  if (written.ok()) return kDone;
+  std::cerr << "radbake-study: error: " << written.error().message << '\n';
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Measures the numeric methods of radbake: what is exact, by how much, and how long it takes");
+  app.set_version_flag("--version", std::string("radbake-study ") + radbake::kEngineVersion);
+  app.require_subcommand(1);
+  const auto positive = [](const std::string& text) -> std::string {
+    const double value = std::strtod(text.c_str(), nullptr);
+    return value > 0 && std::isfinite(value) ? "" : "'" + text + "' is not a number above 0";
+  };
+
+  Choices form_factors{{}, 1e-4, {}};
+  CLI::App* factors =
+      app.add_subcommand("form-factors", "Analytic form factors of polygon pairs, against known values");
+  factors->add_option("CASES", form_factors.cases, "List of cases: polygons, from, to, occluders, exact")->required();
+  factors->add_option("--tolerance", form_factors.tolerance, "Error that is asked for, absolute")
+      ->check(positive, "")
+      ->capture_default_str();
+  factors->add_option("--json", form_factors.json, "Also write the results to this file");
+  factors->footer("\nExample:\n  radbake-study form-factors tests/reference/form_factor_cases.json --tolerance 1e-6\n");
+
+  Choices enclosures{{}, 1e-12, {}};
+  CLI::App* solve = app.add_subcommand("enclosures", "Enclosures with given form factors, by every solver");
+  solve->add_option("CASES", enclosures.cases, "List of cases: F, areas, rho, E, B")->required();
+  solve->add_option("--tolerance", enclosures.tolerance, "Error bound to stop at, over the mean radiosity")
+      ->check(positive, "")
+      ->capture_default_str();
+  solve->add_option("--json", enclosures.json, "Also write the results to this file");
+  solve->footer("\nExample:\n  radbake-study enclosures tests/reference/radiosity_cases.json --json solved.json\n");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  if (factors->parsed()) {
+    return run(form_factors, radbake::study::study_form_factors, radbake::study::form_factor_table);
+  }
+  return run(enclosures, radbake::study::study_enclosures, radbake::study::enclosure_table);
+}

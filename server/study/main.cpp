@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
   factors->add_option("--json", form_factors.json, "Also write the results to this file");
   factors->footer("\nExample:\n  radbake-study form-factors tests/reference/form_factor_cases.json --tolerance 1e-6\n");
 
-  Choices enclosures{{}, 1e-12, {}};
+  Choices enclosures{{}, 5e-11, {}};
   CLI::App* solve = app.add_subcommand("enclosures", "Enclosures with given form factors, by every solver");
   solve->add_option("CASES", enclosures.cases, "List of cases: F, areas, rho, E, B")->required();
   solve->add_option("--tolerance", enclosures.tolerance, "Error bound to stop at, over the mean radiosity")

@@ -37,4 +37,26 @@ Result<void> write_text(const std::filesystem::path& path, const std::string& te
   return internal_error("cannot write " + path.string());
 }
 
+std::string id_of(const Json& result) {
+  return result["id"].is_string() ? result["id"].get<std::string>() : result["id"].dump();
+}
+
+std::string Tally::judge(const Json& result) {
+  if (!result["pass"].is_boolean()) return "";
+  ++judged_;
+  const bool is_passed = result["pass"].get<bool>();
+  passed_ += is_passed;
+  return is_passed ? "pass" : "FAIL";
+}
+
+std::string Tally::refuse(const Json& result) {
+  ++refused_;
+  return id_of(result) + ": refused: " + result["error"].get<std::string>() + "\n";
+}
+
+std::string Tally::summary(const std::string& what) const {
+  return std::to_string(passed_) + " of " + std::to_string(judged_) + " " + what + " with a known answer pass; " +
+         std::to_string(refused_) + " refused\n";
+}
+
 }  // namespace radbake::study

@@ -7,6 +7,7 @@
 
 #include "server/radiosity/solve/solve.h"
 #include "server/radiosity/transport/dense_operator.h"
+#include "server/study/cases.h"
 
 namespace radbake::study {
 namespace {
@@ -111,31 +112,21 @@ std::string enclosure_table(const Json& result) {
   std::snprintf(line, sizeof line, "%-22s %-13s %-16s %9s %9s %10s %10s %10s\n", "case", "solver", "status", "steps",
                 "us", "bound", "true", "");
   std::string text = line;
-  std::size_t passed = 0, judged = 0, refused = 0;
+  Tally tally;
   for (const Json& c : result["cases"]) {
-    const std::string id = c["id"].is_string() ? c["id"].get<std::string>() : c["id"].dump();
     if (c.contains("error")) {
-      ++refused;
-      text += id + ": refused: " + c["error"].get<std::string>() + "\n";
+      text += tally.refuse(c);
       continue;
     }
-    const bool is_judged = c["pass"].is_boolean();
-    judged += is_judged;
-    passed += is_judged && c["pass"].get<bool>();
     char error[20] = "-";
-    if (is_judged) std::snprintf(error, sizeof error, "%.1e", c["true_error"].get<double>());
-    std::snprintf(line, sizeof line, "%-22s %-13s %-16s %9lld %9.0f %10.1e %10s %10s\n", id.c_str(),
+    if (c["true_error"].is_number()) std::snprintf(error, sizeof error, "%.1e", c["true_error"].get<double>());
+    std::snprintf(line, sizeof line, "%-22s %-13s %-16s %9lld %9.0f %10.1e %10s %10s\n", id_of(c).c_str(),
                   c["solver"].get<std::string>().c_str(), c["status"].get<std::string>().c_str(),
                   static_cast<long long>(c["steps"].get<std::int64_t>()), c["microseconds"].get<double>(),
-                  c["error_bound"].get<double>(), error,
-                  !is_judged              ? ""
-                  : c["pass"].get<bool>() ? "pass"
-                                          : "FAIL");
+                  c["error_bound"].get<double>(), error, tally.judge(c).c_str());
     text += line;
   }
-  text += std::to_string(passed) + " of " + std::to_string(judged) + " solves with a known answer pass; " +
-          std::to_string(refused) + " cases refused\n";
-  return text;
+  return text + tally.summary("solves");
 }
 
 }  // namespace radbake::study

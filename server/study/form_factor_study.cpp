@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/radiosity/form_factor/analytic.h"
+#include "server/study/cases.h"
 
 namespace radbake::study {
 namespace {
@@ -19,7 +20,7 @@ constexpr double kRounding = 1e-12;
 constexpr double kLoosest = 10;
 
 struct Case {
-  std::vector<radiosity::Corners> polygons;
+  std::vector<radiosity::PolygonCorners> polygons;
   std::size_t from = 0, to = 0;
   std::vector<std::size_t> occluders;
 };
@@ -29,7 +30,7 @@ Result<Case> read_case(const Json& source) {
   Case out;
   try {
     for (const Json& polygon : source.at("polygons")) {
-      radiosity::Corners& corners = out.polygons.emplace_back();
+      radiosity::PolygonCorners& corners = out.polygons.emplace_back();
       for (const Json& corner : polygon) {
         corners.push_back({corner.at(0).get<double>(), corner.at(1).get<double>(), corner.at(2).get<double>()});
       }
@@ -67,7 +68,7 @@ Json study_case(const Json& source, double tolerance) {
     out["error"] = read.error().message;
     return out;
   }
-  std::vector<radiosity::Corners> occluders;
+  std::vector<radiosity::PolygonCorners> occluders;
   for (const std::size_t i : read->occluders) occluders.push_back(read->polygons[i]);
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
@@ -118,26 +119,16 @@ std::string form_factor_table(const Json& result) {
     text += line;
   };
   add("case", "form factor", "stated", "true", "us", "method", "");
-  std::size_t passed = 0, judged = 0, refused = 0;
+  Tally tally;
   for (const Json& c : result["cases"]) {
-    const std::string id = c["id"].is_string() ? c["id"].get<std::string>() : c["id"].dump();
     if (c.contains("error")) {
-      ++refused;
-      text += id + ": refused: " + c["error"].get<std::string>() + "\n";
+      text += tally.refuse(c);
       continue;
     }
-    const bool is_judged = c["pass"].is_boolean();
-    judged += is_judged;
-    passed += is_judged && c["pass"].get<bool>();
-    add(id, number(c["form_factor"], "%.15g"), number(c["stated_error"], "%.1e"), number(c["true_error"], "%.1e"),
-        number(c["microseconds"], "%.1f"), c["method"].get<std::string>(),
-        !is_judged              ? ""
-        : c["pass"].get<bool>() ? "pass"
-                                : "FAIL");
+    add(id_of(c), number(c["form_factor"], "%.15g"), number(c["stated_error"], "%.1e"), number(c["true_error"], "%.1e"),
+        number(c["microseconds"], "%.1f"), c["method"].get<std::string>(), tally.judge(c));
   }
-  text += std::to_string(passed) + " of " + std::to_string(judged) + " cases with a known answer pass; " +
-          std::to_string(refused) + " refused\n";
-  return text;
+  return text + tally.summary("cases");
 }
 
 }  // namespace radbake::study

@@ -22,8 +22,8 @@ struct Setting {
   Vec3 origin;
   int exponent = 0;
 
-  Corners apply(std::span<const Vec3> corners) const {
-    Corners local;
+  PolygonCorners apply(std::span<const Vec3> corners) const {
+    PolygonCorners local;
     for (const Vec3& corner : corners) {
       const Vec3 d = corner - origin;
       local.push_back({std::ldexp(d.x, -exponent), std::ldexp(d.y, -exponent), std::ldexp(d.z, -exponent)});
@@ -65,7 +65,7 @@ Result<std::vector<Piece>> pieces_of(std::span<const Vec3> corners, const Settin
   const double largest = largest_coordinate(corners);
   const double ulp =
       std::ldexp(std::nextafter(largest, std::numeric_limits<double>::infinity()) - largest, -setting.exponent);
-  const Corners local = setting.apply(corners);
+  const PolygonCorners local = setting.apply(corners);
   RADBAKE_ASSIGN_OR_RETURN(HalfSpace front, plane_of(local, ulp, name));
   return convex_pieces(local, front, name);
 }
@@ -74,9 +74,9 @@ Result<std::vector<Piece>> pieces_of(std::span<const Vec3> corners, const Settin
 std::vector<Piece> uncovered(const std::vector<Piece>& pieces, std::span<const Piece> occluders) {
   std::vector<Piece> result;
   for (const Piece& piece : pieces) {
-    std::vector<Corners> left = {piece.corners};
+    std::vector<PolygonCorners> left = {piece.corners};
     for (const Piece& occluder : occluders) {
-      const auto lies_in = [](const Corners& corners, const HalfSpace& plane) {
+      const auto lies_in = [](const PolygonCorners& corners, const HalfSpace& plane) {
         return std::all_of(corners.begin(), corners.end(), [&](Vec3 p) { return plane.side(p) == 0; });
       };
       if (!lies_in(occluder.corners, piece.front) && !lies_in(piece.corners, occluder.front)) continue;
@@ -89,7 +89,7 @@ std::vector<Piece> uncovered(const std::vector<Piece>& pieces, std::span<const P
       }
       remove_convex(left, hole);
     }
-    for (Corners& corners : left) result.push_back({std::move(corners), piece.front});
+    for (PolygonCorners& corners : left) result.push_back({std::move(corners), piece.front});
   }
   return result;
 }
@@ -99,7 +99,7 @@ std::vector<Piece> uncovered(const std::vector<Piece>& pieces, std::span<const P
 /// The hull's faces: the pieces' planes, and planes through an edge of one and a corner of the other with everything on
 /// one side. What touches the hull from outside has no part inside.
 bool reaches_shaft(const Piece& occluder, const Piece& p, const Piece& q) {
-  Corners rest = occluder.corners, clipped;
+  PolygonCorners rest = occluder.corners, clipped;
   const auto clip = [&](const HalfSpace& inside) {
     clip_convex(rest, inside, clipped);
     rest.swap(clipped);
@@ -109,8 +109,8 @@ bool reaches_shaft(const Piece& occluder, const Piece& p, const Piece& q) {
   const std::array<const Piece*, 2> both = {&p, &q};
   const double near = std::max({p.front.near, q.front.near, occluder.front.near});
   for (int side = 0; side < 2; ++side) {
-    const Corners& edges = both[static_cast<std::size_t>(side)]->corners;
-    const Corners& others = both[static_cast<std::size_t>(1 - side)]->corners;
+    const PolygonCorners& edges = both[static_cast<std::size_t>(side)]->corners;
+    const PolygonCorners& others = both[static_cast<std::size_t>(1 - side)]->corners;
     for (std::size_t k = 0; k < edges.size(); ++k) {
       const Vec3 a = edges[k], ab = edges[(k + 1) % edges.size()] - a;
       for (const Vec3& corner : others) {
@@ -165,7 +165,7 @@ bool coincide(const Piece& p, const Piece& q) {
   for (const Vec3& corner : q.corners) {
     if (p.front.side(corner) != 0) return false;
   }
-  Corners rest = q.corners, clipped;
+  PolygonCorners rest = q.corners, clipped;
   for (std::size_t k = 0; k < p.corners.size(); ++k) {
     const Vec3 a = p.corners[k], b = p.corners[(k + 1) % p.corners.size()];
     const Vec3 inward = cross(p.front.normal, b - a);
@@ -241,7 +241,7 @@ const char* analytic_method_name(AnalyticMethod method) {
 }
 
 Result<PolygonFormFactor> polygon_form_factor(std::span<const Vec3> from, std::span<const Vec3> to,
-                                              std::span<const Corners> occluders, double tolerance) {
+                                              std::span<const PolygonCorners> occluders, double tolerance) {
   // Check the input.
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
     return invalid_argument("the tolerance must be above 0, not " + std::to_string(tolerance));

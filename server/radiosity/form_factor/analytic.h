@@ -8,8 +8,8 @@
 
 namespace radbake::radiosity {
 
-/// Corners [n], n >= 3, of a planar simple polygon, counter-clockwise seen from its front.
-using Corners = std::vector<Vec3>;
+/// PolygonCorners [n], n >= 3, of a planar simple polygon, counter-clockwise seen from its front.
+using PolygonCorners = std::vector<Vec3>;
 
 /// How a form factor was found. Where parts of the patches went different ways, the last of them in this list.
 enum class AnalyticMethod {
@@ -52,6 +52,6 @@ struct PolygonFormFactor {
 /// Cost:   unoccluded: 10 to 600 microseconds; occluded: evaluations x corners of the occluders in the shaft.
 /// Source: Lambert 1760; Schroeder & Hanrahan 1993 (contour); Walton 2002, NISTIR 6925 (projected occluders).
 Result<PolygonFormFactor> polygon_form_factor(std::span<const Vec3> from, std::span<const Vec3> to,
-                                              std::span<const Corners> occluders, double tolerance = 1e-4);
+                                              std::span<const PolygonCorners> occluders, double tolerance = 1e-4);
 
 }  // namespace radbake::radiosity

@@ -19,7 +19,7 @@ struct Edge {
   double length = 0;
 };
 
-std::vector<Edge> edges_of(const Corners& corners) {
+std::vector<Edge> edges_of(const PolygonCorners& corners) {
   std::vector<Edge> edges;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vec3 a = corners[i], b = corners[(i + 1) % corners.size()];

@@ -10,7 +10,7 @@ constexpr double kPlanarUlps = 8;
 // Below this width no digit of the normal is certain.
 constexpr double kWidthUlps = 8;
 
-bool is_convex(const Corners& corners, Vec3 normal, double slack) {
+bool is_convex(const PolygonCorners& corners, Vec3 normal, double slack) {
   const std::size_t n = corners.size();
   double turned = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -81,14 +81,15 @@ Result<HalfSpace> plane_of(std::span<const Vec3> corners, double ulp, const std:
   return front;
 }
 
-Result<std::vector<Piece>> convex_pieces(const Corners& corners, const HalfSpace& front, const std::string& name) {
+Result<std::vector<Piece>> convex_pieces(const PolygonCorners& corners, const HalfSpace& front,
+                                         const std::string& name) {
   std::vector<Piece> pieces;
   if (is_convex(corners, front.normal, front.near)) {
     pieces.push_back({corners, front});
     return pieces;
   }
   // Cut off the ear with the largest smallest angle's sine: fat triangles integrate best.
-  Corners rest = corners;
+  PolygonCorners rest = corners;
   while (rest.size() >= 3) {
     const std::size_t n = rest.size();
     std::size_t best = n;
@@ -117,7 +118,7 @@ Result<std::vector<Piece>> convex_pieces(const Corners& corners, const HalfSpace
   return pieces;
 }
 
-void clip_convex(const Corners& corners, const HalfSpace& inside, Corners& clipped) {
+void clip_convex(const PolygonCorners& corners, const HalfSpace& inside, PolygonCorners& clipped) {
   clipped.clear();
   const std::size_t n = corners.size();
   bool any_inside = false;
@@ -134,10 +135,10 @@ void clip_convex(const Corners& corners, const HalfSpace& inside, Corners& clipp
   if (!any_inside || clipped.size() < 3) clipped.clear();
 }
 
-void remove_convex(std::vector<Corners>& polygons, std::span<const HalfSpace> hole) {
-  std::vector<Corners> left;
-  Corners outside, inside;
-  for (Corners& polygon : polygons) {
+void remove_convex(std::vector<PolygonCorners>& polygons, std::span<const HalfSpace> hole) {
+  std::vector<PolygonCorners> left;
+  PolygonCorners outside, inside;
+  for (PolygonCorners& polygon : polygons) {
     // Leave a polygon whole that lies outside one of the half-spaces.
     const bool is_apart = std::any_of(hole.begin(), hole.end(), [&](const HalfSpace& half) {
       return std::none_of(polygon.begin(), polygon.end(), [&](Vec3 p) { return half.side(p) > 0; });

@@ -10,7 +10,7 @@
 
 namespace radbake::radiosity {
 
-/// A half-space, its inside where distance() > 0. Corners nearer than snap() count as on its plane.
+/// A half-space, its inside where distance() > 0. PolygonCorners nearer than snap() count as on its plane.
 struct HalfSpace {
   Vec3 point;
   Vec3 normal;            ///< unit
@@ -29,7 +29,7 @@ struct HalfSpace {
 
 /// A convex piece of a patch or an occluder and the half-space in front of its plane.
 struct Piece {
-  Corners corners;
+  PolygonCorners corners;
   HalfSpace front;
 };
 
@@ -48,14 +48,15 @@ Result<HalfSpace> plane_of(std::span<const Vec3> corners, double ulp, const std:
 /// Cuts a simple polygon into convex pieces: itself, or triangles by cutting ears off.
 /// Errors: kInvalidArgument if no ear is left: the outline crosses itself.
 /// Source: Meisters 1975.
-Result<std::vector<Piece>> convex_pieces(const Corners& corners, const HalfSpace& front, const std::string& name);
+Result<std::vector<Piece>> convex_pieces(const PolygonCorners& corners, const HalfSpace& front,
+                                         const std::string& name);
 
 /// The part of a convex polygon inside a half-space. Empty if no corner is strictly inside.
 /// Source: Sutherland & Hodgman 1974.
-void clip_convex(const Corners& corners, const HalfSpace& inside, Corners& clipped);
+void clip_convex(const PolygonCorners& corners, const HalfSpace& inside, PolygonCorners& clipped);
 
 /// Takes the intersection of the half-spaces out of convex polygons; what is left is convex polygons again.
-void remove_convex(std::vector<Corners>& polygons, std::span<const HalfSpace> hole);
+void remove_convex(std::vector<PolygonCorners>& polygons, std::span<const HalfSpace> hole);
 
 /// Shortest distance between a point and a segment.
 double distance_to_segment(Vec3 p, Vec3 a, Vec3 b);

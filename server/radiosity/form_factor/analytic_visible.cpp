@@ -31,7 +31,7 @@ class VisiblePart {
     for (const Vec3& a : outer.corners) {
       for (const Vec3& b : inner.corners) extent_ = std::max(extent_, length(a - b));
     }
-    // Corners are known to their spacing, points of the patches to that of the scale.
+    // PolygonCorners are known to their spacing, points of the patches to that of the scale.
     for (const Piece& occluder : occluders) {
       const double near = std::max({outer.front.near, inner.front.near, occluder.front.near, 8 * kEpsilon});
       occluders_.push_back({occluder, mean_corner(occluder.corners), near});
@@ -66,12 +66,12 @@ class VisiblePart {
       if (parts_.empty()) return 0;
     }
     double sum = 0;
-    for (const Corners& part : parts_) sum += lambert(p, part);
+    for (const PolygonCorners& part : parts_) sum += lambert(p, part);
     return std::max(0.0, sum);
   }
 
  private:
-  double lambert(Vec3 p, const Corners& part) const {
+  double lambert(Vec3 p, const PolygonCorners& part) const {
     double sum = 0;
     for (std::size_t k = 0; k < part.size(); ++k) {
       const Vec3 a = part[k] - p, b = part[(k + 1) % part.size()] - p, c = cross(a, b);
@@ -90,7 +90,7 @@ class VisiblePart {
   double extent_;
   const Piece& inner_;
   std::vector<Occluder> occluders_;
-  std::vector<Corners> parts_;
+  std::vector<PolygonCorners> parts_;
   std::vector<HalfSpace> pyramid_;
 };
 
@@ -123,7 +123,7 @@ class EventLines {
   const std::vector<EventLine>& lines() const { return lines_; }
 
  private:
-  void add_edges_and_corners(const Corners& edges, const Corners& corners) {
+  void add_edges_and_corners(const PolygonCorners& edges, const PolygonCorners& corners) {
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const Vec3 a = edges[i], ab = edges[(i + 1) % edges.size()] - a;
       for (const Vec3& corner : corners) {

@@ -11,7 +11,6 @@
 namespace radbake::radiosity {
 namespace {
 
-const double kCosineOfSameNormal = std::cos(1 * std::numbers::pi / 180);
 const double kCosineOfCrease = std::cos(40 * std::numbers::pi / 180);
 
 /// Union-find over all corners; the smaller index is the root.
@@ -42,18 +41,14 @@ void join_by_normal(const Surfaces& surfaces, const MeshRange& range, Sets& sets
   };
   std::sort(corners.begin(), corners.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
   const auto position = [&](std::uint32_t corner) { return surfaces.corners[corner / 3][corner % 3]; };
-  const auto normal = [&](std::uint32_t corner) {
-    const Vec3 n = surfaces.mesh(corner / 3).normals[surfaces.vertices(corner / 3)[corner % 3]];
-    return length(n) > 0 ? normalized(n) : surfaces.normals[corner / 3];
-  };
   for (std::size_t i = 0; i < corners.size();) {
     // One representative a normal: places where very many corners meet have few normals.
     std::vector<std::pair<Vec3, std::uint32_t>> known;
     std::size_t j = i;
     for (; j < corners.size() && position(corners[j]) == position(corners[i]); ++j) {
-      const Vec3 own = normal(corners[j]);
-      const auto same = std::find_if(known.begin(), known.end(),
-                                     [&](const auto& k) { return dot(k.first, own) >= kCosineOfSameNormal; });
+      const Vec3 own = surfaces.corner_normal(corners[j] / 3, static_cast<int>(corners[j] % 3));
+      const auto same =
+          std::find_if(known.begin(), known.end(), [&](const auto& k) { return are_same_normal(k.first, own); });
       if (same == known.end()) {
         known.emplace_back(own, corners[j]);
       } else {

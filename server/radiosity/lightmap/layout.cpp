@@ -123,7 +123,7 @@ class LayoutMaker {
 
   /// Decides which objects keep their own layout. Errors: one must and cannot.
   Result<void> judge_objects() {
-    std::string overlaps, unwrapped;
+    std::string unwrapped;
     std::size_t num_unwrapped = 0;
     for (Object& object : objects_) {
       if (options_.uv == LightmapUv::kUnwrap) {

@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "server/radiosity/survey/mesh_edges.h"
 
 namespace radbake::radiosity {
 namespace {
 
-const double kCosineOfSameNormal = std::cos(1 * std::numbers::pi / 180);
 constexpr double kSamplesPerTexel = 2;
 /// Ends of an edge that lie nearer, in texels, lie side by side.
 constexpr double kSamePlace = 1e-3;
@@ -32,13 +30,6 @@ struct LookUp {
 struct SeamSample {
   LookUp a, b;
 };
-
-Vec3 corner_normal(const Surfaces& surfaces, std::uint32_t t, int corner) {
-  const Mesh& mesh = surfaces.mesh(t);
-  if (mesh.normals.empty()) return surfaces.normals[t];
-  const Vec3 n = mesh.normals[surfaces.vertices(t)[corner]];
-  return length(n) > 0 ? normalized(n) : surfaces.normals[t];
-}
 
 /// Looks up where a point of a sheet lies: texel centres at halves, clamped at the sheet's border.
 LookUp look_up(const Layout& layout, int sheet, Vec2 p) {
@@ -67,9 +58,8 @@ std::vector<SeamSample> find_samples(const Surfaces& surfaces, const Layout& lay
       const auto& b = layout.corners[edge.b];
       if (distance(a[a0], b[b0]) < kSamePlace && distance(a[a1], b[b1]) < kSamePlace) continue;
       if (twice_area(a) == 0 || twice_area(b) == 0) continue;
-      const bool is_smooth =
-          dot(corner_normal(surfaces, edge.a, a0), corner_normal(surfaces, edge.b, b0)) >= kCosineOfSameNormal &&
-          dot(corner_normal(surfaces, edge.a, a1), corner_normal(surfaces, edge.b, b1)) >= kCosineOfSameNormal;
+      const bool is_smooth = are_same_normal(surfaces.corner_normal(edge.a, a0), surfaces.corner_normal(edge.b, b0)) &&
+                             are_same_normal(surfaces.corner_normal(edge.a, a1), surfaces.corner_normal(edge.b, b1));
       if (!is_smooth) continue;
       const double texels = std::max(distance(a[a0], a[a1]), distance(b[b0], b[b1]));
       const int sheet = layout.meshes[surfaces.meshes[edge.a]].sheet;

@@ -45,8 +45,8 @@ struct BakePlan {
   std::vector<Warning> warnings;
 };
 
-inline constexpr int kMinAtlasSize = 64;
-inline constexpr int kMaxAtlasSize = 4096;
+inline constexpr int kMinAtlasSize = kMinSheet;
+inline constexpr int kMaxAtlasSize = kMaxSheet;
 inline constexpr double kDefaultTexelsPerMeter = 32;
 inline constexpr int kDefaultRays = 256;
 inline constexpr int kMinRays = 8;

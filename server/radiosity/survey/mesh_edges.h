@@ -7,6 +7,12 @@
 
 namespace radbake::radiosity {
 
+/// Normals nearer than a degree are one: light has no step there.
+inline bool are_same_normal(Vec3 a, Vec3 b) {
+  constexpr double kCosineOfOneDegree = 0.99984769515639127;
+  return dot(a, b) >= kCosineOfOneDegree;
+}
+
 /// The triangles of a scene mesh: [begin, end) of the surfaces'.
 struct MeshRange {
   std::uint32_t begin = 0, end = 0;

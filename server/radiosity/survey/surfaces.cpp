@@ -34,6 +34,13 @@ Vec3 Surfaces::shading_normal(const SurfacePoint& p) const {
   return normal / size;
 }
 
+Vec3 Surfaces::corner_normal(std::uint32_t triangle, int corner) const {
+  const Mesh& own = mesh(triangle);
+  if (own.normals.empty()) return normals[triangle];
+  const Vec3 normal = own.normals[vertices(triangle)[corner]];
+  return length(normal) > 0 ? normalized(normal) : normals[triangle];
+}
+
 Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
   const Material& own = material(p.triangle);
   const Vec3 reflectance = textured(*this, p, own.reflectance, own.reflectance_texture);

@@ -51,6 +51,8 @@ class Surfaces {
   }
   /// Interpolated NORMAL, unit length, or the geometric one where the mesh has none or it points away.
   Vec3 shading_normal(const SurfacePoint& p) const;
+  /// NORMAL at a corner (0..2), unit length, or the geometric one where the mesh has none.
+  Vec3 corner_normal(std::uint32_t triangle, int corner) const;
   /// Reflectance there: factor times texture times the vertices' colours, each channel in [0, 1).
   Vec3 reflectance(const SurfacePoint& p) const;
   /// Exitance there: pi times factor times texture, lx.

@@ -19,7 +19,7 @@ constexpr double kReference = 1e-12;
 
 struct Case {
   std::string id;
-  std::vector<Corners> polygons;
+  std::vector<PolygonCorners> polygons;
   std::size_t from = 0, to = 0;
   std::vector<std::size_t> occluders;
   double exact = 0;
@@ -32,7 +32,7 @@ const std::vector<Case>& all_cases() {
     for (const auto& c : nlohmann::json::parse(file)) {
       Case made{c.at("id"), {}, c.at("from"), c.at("to"), c.at("occluders"), c.at("exact")};
       for (const auto& polygon : c.at("polygons")) {
-        Corners corners;
+        PolygonCorners corners;
         for (const auto& corner : polygon) corners.push_back({corner.at(0), corner.at(1), corner.at(2)});
         made.polygons.push_back(corners);
       }
@@ -44,7 +44,7 @@ const std::vector<Case>& all_cases() {
 }
 
 Result<PolygonFormFactor> measure(const Case& c, double tolerance) {
-  std::vector<Corners> occluders;
+  std::vector<PolygonCorners> occluders;
   for (const std::size_t k : c.occluders) occluders.push_back(c.polygons[k]);
   return polygon_form_factor(c.polygons[c.from], c.polygons[c.to], occluders, tolerance);
 }
@@ -72,12 +72,12 @@ Case transformed(const Case& c, std::mt19937_64& random, bool centre_at_origin) 
       Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix() * std::pow(10, decades(random));
   Vec3 centroid;
   double num_corners = 0;
-  for (const Corners& polygon : c.polygons) {
+  for (const PolygonCorners& polygon : c.polygons) {
     for (const Vec3& corner : polygon) centroid += corner, ++num_corners;
   }
   centroid = centroid / num_corners;
   Case result = c;
-  for (Corners& polygon : result.polygons) {
+  for (PolygonCorners& polygon : result.polygons) {
     for (Vec3& corner : polygon) {
       const Vec3 d = corner - centroid;
       const Eigen::Vector3d turned = rotation * Eigen::Vector3d(d.x, d.y, d.z);
@@ -131,7 +131,7 @@ TEST(FormFactorCases, AreReciprocal) {
     std::swap(back.from, back.to);
     const auto there = measure(c, 1e-6), other = measure(back, 1e-6);
     ASSERT_TRUE(there.ok() && other.ok()) << c.id;
-    const auto area = [](const Corners& corners) {
+    const auto area = [](const PolygonCorners& corners) {
       Vec3 sum;
       for (std::size_t k = 1; k + 1 < corners.size(); ++k) {
         sum += cross(corners[k] - corners[0], corners[k + 1] - corners[0]);
@@ -147,7 +147,7 @@ TEST(FormFactorCases, AreReciprocal) {
 TEST(FormFactorCases, KeepTheirBitsUnderAPowerOfTwo) {
   for (const Case& c : all_cases()) {
     Case scaled = c;
-    for (Corners& polygon : scaled.polygons) {
+    for (PolygonCorners& polygon : scaled.polygons) {
       for (Vec3& corner : polygon) corner = corner * 0x1p-20;
     }
     const auto result = measure(c, 1e-4), small = measure(scaled, 1e-4);

@@ -15,17 +15,17 @@ constexpr double kRounding = 1e-12;
 // Asked of the occluded integrals here.
 constexpr double kTolerance = 1e-6;
 
-PolygonFormFactor form_factor(const Corners& from, const Corners& to, const std::vector<Corners>& occluders = {},
-                              double tolerance = kTolerance) {
+PolygonFormFactor form_factor(const PolygonCorners& from, const PolygonCorners& to,
+                              const std::vector<PolygonCorners>& occluders = {}, double tolerance = kTolerance) {
   const auto result = polygon_form_factor(from, to, occluders, tolerance);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
   return result.ok() ? *result : PolygonFormFactor{NAN, NAN, AnalyticMethod::kZero, 0};
 }
 
 /// A parallelogram that faces along cross(u, v).
-Corners parallelogram(Vec3 corner, Vec3 u, Vec3 v) { return {corner, corner + u, corner + u + v, corner + v}; }
+PolygonCorners parallelogram(Vec3 corner, Vec3 u, Vec3 v) { return {corner, corner + u, corner + u + v, corner + v}; }
 
-Corners reversed(const Corners& corners) { return {corners.rbegin(), corners.rend()}; }
+PolygonCorners reversed(const PolygonCorners& corners) { return {corners.rbegin(), corners.rend()}; }
 
 /// Howell's C-11: parallel equal rectangles a x b at distance c.
 double parallel_rectangles(double a, double b, double c) {
@@ -46,7 +46,7 @@ double perpendicular_rectangles(double w, double h, double l) {
 }
 
 /// The faces of a box that face inwards: floor, ceiling, x = 0, x = size, y = 0, y = size.
-std::array<Corners, 6> faces_inward(Vec3 o, double size) {
+std::array<PolygonCorners, 6> faces_inward(Vec3 o, double size) {
   const Vec3 x{size, 0, 0}, y{0, size, 0}, z{0, 0, size};
   return {parallelogram(o, x, y),     parallelogram(o + z, y, x), parallelogram(o, y, z),
           parallelogram(o + x, z, y), parallelogram(o, z, x),     parallelogram(o + y, x, z)};
@@ -72,7 +72,8 @@ TEST(PolygonFormFactor, MatchesTheClosedFormOfPerpendicularRectanglesThatShareAn
 
 TEST(PolygonFormFactor, SharesATetrahedronEqually) {
   const Vec3 a{1, 1, 1}, b{-1, -1, 1}, c{-1, 1, -1}, d{1, -1, -1};
-  const std::array<Corners, 4> faces = {Corners{b, c, a}, Corners{a, d, b}, Corners{a, c, d}, Corners{b, d, c}};
+  const std::array<PolygonCorners, 4> faces = {PolygonCorners{b, c, a}, PolygonCorners{a, d, b},
+                                               PolygonCorners{a, c, d}, PolygonCorners{b, d, c}};
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
       EXPECT_NEAR(form_factor(faces[i], faces[j]).form_factor, i == j ? 0.0 : 1.0 / 3, kRounding) << i << " " << j;
@@ -105,12 +106,13 @@ TEST(PolygonFormFactor, GrowsSteadilyAsTwoPlatesCloseUp) {
 }
 
 TEST(PolygonFormFactor, AddsUpOverAPatchThatIsNotConvex) {
-  const Corners whole = {{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}};
-  const Corners low = parallelogram({0, 0, 0}, {2, 0, 0}, {0, 1, 0}),
-                high = parallelogram({0, 1, 0}, {1, 0, 0}, {0, 2, 0});
-  const Corners wall = parallelogram({0.5, -1, -1}, {0, 3, 0}, {0, 0, 2});  // through it, so that clipping takes part
-  const Corners ceiling = parallelogram({0, 0, 1.5}, {0, 2, 0}, {2, 0, 0});
-  for (const Corners& other : {wall, ceiling}) {
+  const PolygonCorners whole = {{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}};
+  const PolygonCorners low = parallelogram({0, 0, 0}, {2, 0, 0}, {0, 1, 0}),
+                       high = parallelogram({0, 1, 0}, {1, 0, 0}, {0, 2, 0});
+  const PolygonCorners wall =
+      parallelogram({0.5, -1, -1}, {0, 3, 0}, {0, 0, 2});  // through it, so that clipping takes part
+  const PolygonCorners ceiling = parallelogram({0, 0, 1.5}, {0, 2, 0}, {2, 0, 0});
+  for (const PolygonCorners& other : {wall, ceiling}) {
     EXPECT_NEAR(form_factor(other, whole).form_factor,
                 form_factor(other, low).form_factor + form_factor(other, high).form_factor, kRounding);
     EXPECT_NEAR(4 * form_factor(whole, other).form_factor,
@@ -119,8 +121,8 @@ TEST(PolygonFormFactor, AddsUpOverAPatchThatIsNotConvex) {
 }
 
 TEST(PolygonFormFactor, KeepsReciprocityForAreasTwelveDecadesApart) {
-  const Corners small = parallelogram({0.3, 0.4, 0.01}, {0, 1e-6, 0}, {1e-6, 0, 0});
-  const Corners large = parallelogram({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  const PolygonCorners small = parallelogram({0.3, 0.4, 0.01}, {0, 1e-6, 0}, {1e-6, 0, 0});
+  const PolygonCorners large = parallelogram({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   const double from_small = form_factor(small, large).form_factor, from_large = form_factor(large, small).form_factor;
   EXPECT_GT(from_small, 0.99);
   EXPECT_NEAR(from_large / (from_small * 1e-12), 1, 1e-9);  // the small patch's sides have 10 digits at 0.3
@@ -128,15 +130,15 @@ TEST(PolygonFormFactor, KeepsReciprocityForAreasTwelveDecadesApart) {
 
 TEST(PolygonFormFactor, ClosesAndPairsNestedBoxes) {
   const auto outer = faces_inward({0, 0, 0}, 1);
-  std::array<Corners, 6> inner = faces_inward({0.25, 0.25, 0.25}, 0.5);
-  for (Corners& face : inner) face = reversed(face);
-  const std::vector<Corners> box(inner.begin(), inner.end());
+  std::array<PolygonCorners, 6> inner = faces_inward({0.25, 0.25, 0.25}, 0.5);
+  for (PolygonCorners& face : inner) face = reversed(face);
+  const std::vector<PolygonCorners> box(inner.begin(), inner.end());
   double sum = 0, to_inner = 0, stated = 0;
   for (std::size_t j = 0; j < 6; ++j) {
     const auto past = form_factor(outer[0], outer[j], box);
     sum += past.form_factor;
     stated += past.stated_error;
-    std::vector<Corners> others = box;
+    std::vector<PolygonCorners> others = box;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(j));
     const auto onto = form_factor(outer[0], inner[j], others);
     sum += onto.form_factor;
@@ -152,8 +154,8 @@ TEST(PolygonFormFactor, ClosesAndPairsNestedBoxes) {
 }
 
 TEST(PolygonFormFactor, MatchesOccludedPairsThatSymmetrySolves) {
-  const Corners floor = parallelogram({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
-  const Corners ceiling = parallelogram({0, 0, 1}, {0, 1, 0}, {1, 0, 0});
+  const PolygonCorners floor = parallelogram({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  const PolygonCorners ceiling = parallelogram({0, 0, 1}, {0, 1, 0}, {1, 0, 0});
   const double whole = parallel_rectangles(1, 1, 1);
   // Half a plate at any height hides half: the points where rays cross it are mirrored.
   for (const double z : {1e-6, 0.1, 0.3, 0.5, 0.9, 1 - 1e-6}) {
@@ -176,13 +178,13 @@ TEST(PolygonFormFactor, AgreesFromBothSidesBehindRandomTriangles) {
   // The two sides are integrated over different patches, so their events and cells differ.
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
-  const Corners floor = parallelogram({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
-  const Corners wall = parallelogram({0, 0, 0.2}, {0, 1, 0}, {0, 0, 1.5});
+  const PolygonCorners floor = parallelogram({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  const PolygonCorners wall = parallelogram({0, 0, 0.2}, {0, 1, 0}, {0, 0, 1.5});
   int num_partly_hidden = 0;
   for (int trial = 0; trial < 10; ++trial) {
-    std::vector<Corners> occluders;
+    std::vector<PolygonCorners> occluders;
     for (int k = 0; k <= trial % 4; ++k) {
-      Corners triangle;
+      PolygonCorners triangle;
       for (int i = 0; i < 3; ++i) triangle.push_back({unit(random), unit(random), unit(random)});
       occluders.push_back(triangle);
     }

@@ -7,21 +7,22 @@
 namespace radbake::radiosity {
 namespace {
 
-const Corners kFloor = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-const Corners kCeiling = {{0, 1, 1}, {1, 1, 1}, {1, 0, 1}, {0, 0, 1}};
+const PolygonCorners kFloor = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+const PolygonCorners kCeiling = {{0, 1, 1}, {1, 1, 1}, {1, 0, 1}, {0, 0, 1}};
 
 /// A rectangle at a height, x and y from low to high.
-Corners plate(double x0, double x1, double y0, double y1, double z) {
+PolygonCorners plate(double x0, double x1, double y0, double y1, double z) {
   return {{x0, y0, z}, {x1, y0, z}, {x1, y1, z}, {x0, y1, z}};
 }
 
-double form_factor(const Corners& from, const Corners& to, const std::vector<Corners>& occluders = {}) {
+double form_factor(const PolygonCorners& from, const PolygonCorners& to,
+                   const std::vector<PolygonCorners>& occluders = {}) {
   const auto result = polygon_form_factor(from, to, occluders, 1e-6);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
   return result.ok() ? result->form_factor : NAN;
 }
 
-void expect_refused(const Corners& from, const Corners& to, const std::vector<Corners>& occluders,
+void expect_refused(const PolygonCorners& from, const PolygonCorners& to, const std::vector<PolygonCorners>& occluders,
                     const std::string& words) {
   const auto result = polygon_form_factor(from, to, occluders, 1e-4);
   ASSERT_FALSE(result.ok()) << words;
@@ -47,7 +48,7 @@ TEST(PolygonPolicy, RefusesAToleranceThatIsNotAboveZero) {
 
 TEST(PolygonPolicy, TakesCornersThatAreOffTheirPlaneByRounding) {
   // 2 ulp of a coordinate of 1 off a plane at half height.
-  Corners ceiling = kCeiling;
+  PolygonCorners ceiling = kCeiling;
   ceiling[0].z += 2 * 0x1p-52;
   EXPECT_NEAR(form_factor(kFloor, ceiling), form_factor(kFloor, kCeiling), 1e-14);
   ceiling[0].z += 200 * 0x1p-52;
@@ -56,12 +57,12 @@ TEST(PolygonPolicy, TakesCornersThatAreOffTheirPlaneByRounding) {
 
 TEST(PolygonPolicy, RefusesPatchesThatCoincideFaceToFace) {
   expect_refused(kFloor, {kFloor.rbegin(), kFloor.rend()}, {}, "coincide");
-  const Corners part = plate(0.5, 1.5, 0.5, 1.5, 0);
+  const PolygonCorners part = plate(0.5, 1.5, 0.5, 1.5, 0);
   expect_refused(kFloor, {part.rbegin(), part.rend()}, {}, "coincide");
 }
 
 TEST(PolygonPolicy, GivesZeroToCoplanarPatchesThatDoNotOverlapFaceToFace) {
-  const Corners beside = plate(1, 2, 0, 1, 0);
+  const PolygonCorners beside = plate(1, 2, 0, 1, 0);
   EXPECT_EQ(form_factor(kFloor, beside), 0);
   EXPECT_EQ(form_factor(kFloor, {beside.rbegin(), beside.rend()}), 0);
   EXPECT_EQ(form_factor(kFloor, kFloor), 0);
@@ -111,14 +112,15 @@ TEST(PolygonPolicy, CoversAPatchWithAnOccluderInItsPlane) {
 TEST(PolygonPolicy, NeverLeaksThroughASeamHoweverTheWallIsCut) {
   const double whole = form_factor(kFloor, kCeiling, {plate(0.25, 0.75, 0.25, 0.75, 0.5)});
   const Vec3 middle{0.43, 0.61, 0.5};
-  const Corners outline = plate(0.25, 0.75, 0.25, 0.75, 0.5);
-  std::vector<Corners> fan;
+  const PolygonCorners outline = plate(0.25, 0.75, 0.25, 0.75, 0.5);
+  std::vector<PolygonCorners> fan;
   for (std::size_t k = 0; k < 4; ++k) fan.push_back({outline[k], outline[(k + 1) % 4], middle});
   EXPECT_NEAR(form_factor(kFloor, kCeiling, fan), whole, 2e-6);
 }
 
 TEST(PolygonPolicy, TakesAnOccluderThatIsNotConvex) {
-  const Corners angle = {{0, 0, 0.4}, {0.8, 0, 0.4}, {0.8, 0.3, 0.4}, {0.3, 0.3, 0.4}, {0.3, 0.9, 0.4}, {0, 0.9, 0.4}};
+  const PolygonCorners angle = {{0, 0, 0.4},     {0.8, 0, 0.4},   {0.8, 0.3, 0.4},
+                                {0.3, 0.3, 0.4}, {0.3, 0.9, 0.4}, {0, 0.9, 0.4}};
   EXPECT_NEAR(form_factor(kFloor, kCeiling, {angle}),
               form_factor(kFloor, kCeiling, {plate(0, 0.8, 0, 0.3, 0.4), plate(0, 0.3, 0.3, 0.9, 0.4)}), 2e-6);
 }

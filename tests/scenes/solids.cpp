@@ -96,4 +96,31 @@ Scene make_furnished_hall() {
   return scene;
 }
 
+Scene twisted_box(double radians) {
+  Scene scene;
+  Material& glowing = scene.materials.emplace_back();
+  glowing.reflectance = {0.5, 0.5, 0.5};
+  glowing.emissive = Vec3{1, 1, 1} / std::numbers::pi;
+  std::vector<Vec3> bottom, top;
+  for (int k = 0; k < 4; ++k) {
+    const double angle = std::numbers::pi / 2 * k, radius = std::sqrt(0.5);
+    bottom.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
+    top.push_back({radius * std::cos(angle + radians), radius * std::sin(angle + radians), 1});
+  }
+  const auto add = [&](const std::string& name, std::vector<Vec3> positions) {
+    Mesh& mesh = scene.meshes.emplace_back();
+    mesh.name = name;
+    mesh.object = static_cast<int>(scene.meshes.size()) - 1;
+    mesh.positions = std::move(positions);
+    mesh.triangles = {{1, 2, 3}, {3, 0, 1}};
+  };
+  add("bottom", {bottom[0], bottom[1], bottom[2], bottom[3]});
+  add("top", {top[3], top[2], top[1], top[0]});
+  for (std::size_t k = 0; k < 4; ++k) {
+    const std::size_t next = (k + 1) % 4;
+    add("side" + std::to_string(k), {bottom[next], bottom[k], top[k], top[next]});
+  }
+  return scene;
+}
+
 }  // namespace radbake::tests

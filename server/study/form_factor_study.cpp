@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "server/radiosity/form_factor/analytic.h"
 #include "server/study/cases.h"
+#include "server/study/sampled_pair.h"
 
 namespace radbake::study {
 namespace {
@@ -19,79 +21,77 @@ constexpr double kRounding = 1e-12;
 /// A stated error may be so many times the tolerance that was asked for.
 constexpr double kLoosest = 10;
 
-struct Case {
-  std::vector<radiosity::PolygonCorners> polygons;
-  std::size_t from = 0, to = 0;
-  std::vector<std::size_t> occluders;
+constexpr std::pair<const char*, PairEstimator> kEstimators[] = {{"analytic", PairEstimator::kAnalytic},
+                                                                 {"hemicube", PairEstimator::kHemicube},
+                                                                 {"hemisphere", PairEstimator::kHemisphere}};
+
+struct Found {
+  double form_factor = 0;
+  double stated_error = 0;
+  const char* method = "";
 };
 
-/// Errors: kInvalidArgument naming the member.
-Result<Case> read_case(const Json& source) {
-  Case out;
-  try {
-    for (const Json& polygon : source.at("polygons")) {
-      radiosity::PolygonCorners& corners = out.polygons.emplace_back();
-      for (const Json& corner : polygon) {
-        corners.push_back({corner.at(0).get<double>(), corner.at(1).get<double>(), corner.at(2).get<double>()});
-      }
-    }
-    const auto polygon = [&](const Json& index, const char* member) {
-      const auto i = index.get<std::int64_t>();
-      if (i < 0 || i >= static_cast<std::int64_t>(out.polygons.size())) {
-        throw std::out_of_range(std::string(member) + " is " + std::to_string(i) + ", but the case has " +
-                                std::to_string(out.polygons.size()) + " polygons");
-      }
-      return static_cast<std::size_t>(i);
-    };
-    out.from = polygon(source.at("from"), "from");
-    out.to = polygon(source.at("to"), "to");
-    if (source.contains("occluders")) {
-      for (const Json& index : source["occluders"]) out.occluders.push_back(polygon(index, "occluders"));
-    }
-  } catch (const std::exception& exception) {
-    return invalid_argument(exception.what());
-  }
-  return out;
-}
+/// Finds the form factor of one pair by one method.
+class PairStudy {
+ public:
+  PairStudy(PairEstimator estimator, double tolerance)
+      : estimator_(estimator),
+        tolerance_(tolerance),
+        points_(estimator == PairEstimator::kHemisphere ? kMaxRaysOfReplicate : kMaxSitesOfReplicate) {}
 
-Json study_case(const Json& source, double tolerance) {
-  const Json id = source.contains("id") ? source["id"] : Json("");
-  Json out = {{"id", id},
-              {"form_factor", nullptr},
-              {"stated_error", nullptr},
-              {"true_error", nullptr},
-              {"microseconds", nullptr},
-              {"method", nullptr},
-              {"pass", nullptr}};
-  const Result<Case> read = read_case(source);
-  if (!read.ok()) {
-    out["error"] = read.error().message;
+  Result<Found> find(const PolygonCase& pair) const {
+    if (estimator_ == PairEstimator::kAnalytic) {
+      RADBAKE_ASSIGN_OR_RETURN(const radiosity::PolygonFormFactor found,
+                               radiosity::polygon_form_factor(pair.from, pair.to, pair.occluders, tolerance_));
+      return Found{found.form_factor, found.stated_error, radiosity::analytic_method_name(found.method)};
+    }
+    RADBAKE_ASSIGN_OR_RETURN(const PolygonPair local, PolygonPair::make(pair));
+    const bool is_hemicube = estimator_ == PairEstimator::kHemicube;
+    const SampledFormFactor found =
+        is_hemicube ? sampled_by_hemicubes(local, points_, tolerance_) : sampled_by_rays(local, points_, tolerance_);
+    return Found{found.form_factor, found.stated_error, is_hemicube ? "hemicube" : "hemisphere"};
+  }
+
+  Json study(const Json& source) const {
+    const Json id = source.contains("id") ? source["id"] : Json("");
+    Json out = {{"id", id},
+                {"form_factor", nullptr},
+                {"stated_error", nullptr},
+                {"true_error", nullptr},
+                {"microseconds", nullptr},
+                {"method", nullptr},
+                {"pass", nullptr}};
+    const Result<PolygonCase> pair = read_polygon_case(source);
+    if (!pair.ok()) {
+      out["error"] = pair.error().message;
+      return out;
+    }
+    using Clock = std::chrono::steady_clock;
+    const auto start = Clock::now();
+    const Result<Found> found = find(*pair);
+    out["microseconds"] = std::chrono::duration<double>(Clock::now() - start).count() * 1e6;
+    if (!found.ok()) {
+      out["error"] = found.error().message;
+      if (source.contains("exact")) out["pass"] = false;
+      return out;
+    }
+    out["form_factor"] = found->form_factor;
+    out["stated_error"] = found->stated_error;
+    out["method"] = found->method;
+    if (source.contains("exact") && source["exact"].is_number()) {
+      const double error = std::fabs(found->form_factor - source["exact"].get<double>());
+      out["true_error"] = error;
+      out["pass"] = error <= std::max(found->stated_error, kRounding) && error <= tolerance_ &&
+                    found->stated_error <= kLoosest * tolerance_;
+    }
     return out;
   }
-  std::vector<radiosity::PolygonCorners> occluders;
-  for (const std::size_t i : read->occluders) occluders.push_back(read->polygons[i]);
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
-  const auto found =
-      radiosity::polygon_form_factor(read->polygons[read->from], read->polygons[read->to], occluders, tolerance);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  out["microseconds"] = seconds * 1e6;
-  if (!found.ok()) {
-    out["error"] = found.error().message;
-    if (source.contains("exact")) out["pass"] = false;
-    return out;
-  }
-  out["form_factor"] = found->form_factor;
-  out["stated_error"] = found->stated_error;
-  out["method"] = radiosity::analytic_method_name(found->method);
-  if (source.contains("exact") && source["exact"].is_number()) {
-    const double error = std::fabs(found->form_factor - source["exact"].get<double>());
-    out["true_error"] = error;
-    out["pass"] = error <= std::max(found->stated_error, kRounding) && error <= tolerance &&
-                  found->stated_error <= kLoosest * tolerance;
-  }
-  return out;
-}
+
+ private:
+  PairEstimator estimator_;
+  double tolerance_;
+  SobolPoints points_;
+};
 
 std::string number(const Json& value, const char* format) {
   if (!value.is_number()) return "-";
@@ -102,9 +102,19 @@ std::string number(const Json& value, const char* format) {
 
 }  // namespace
 
-Json study_form_factors(const Json& cases, double tolerance) {
+Result<PairEstimator> pair_estimator_by_name(std::string_view name) {
+  std::string names;
+  for (const auto& [known, estimator] : kEstimators) {
+    if (name == known) return estimator;
+    names += std::string(names.empty() ? "" : ", ") + known;
+  }
+  return invalid_argument("no estimator is called '" + std::string(name) + "': choose one of " + names);
+}
+
+Json study_form_factors(const Json& cases, PairEstimator estimator, double tolerance) {
+  const PairStudy study(estimator, tolerance);
   Json result = {{"cases", Json::array()}};
-  for (const Json& source : cases) result["cases"].push_back(study_case(source, tolerance));
+  for (const Json& source : cases) result["cases"].push_back(study.study(source));
   return result;
 }
 

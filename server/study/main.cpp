@@ -20,6 +20,7 @@ struct Choices {
   std::string cases;
   double tolerance = 0;
   std::string json;
+  std::string estimator;  ///< of form factors
 };
 
 /// Reads the cases, studies them, prints the table and writes the JSON.
@@ -50,17 +51,27 @@ int main(int argc, char** argv) {
     return value > 0 && std::isfinite(value) ? "" : "'" + text + "' is not a number above 0";
   };
 
-  Choices form_factors{{}, 1e-4, {}};
-  CLI::App* factors =
-      app.add_subcommand("form-factors", "Analytic form factors of polygon pairs, against known values");
+  Choices form_factors{{}, 1e-4, {}, "analytic"};
+  CLI::App* factors = app.add_subcommand("form-factors", "Form factors of polygon pairs, against known values");
   factors->add_option("CASES", form_factors.cases, "List of cases: polygons, from, to, occluders, exact")->required();
   factors->add_option("--tolerance", form_factors.tolerance, "Error that is asked for, absolute")
       ->check(positive, "")
       ->capture_default_str();
+  factors
+      ->add_option("--estimator", form_factors.estimator,
+                   "How: analytic (by formula), hemisphere (rays) or hemicube; the sampled ones go on until the error "
+                   "that they state is within the tolerance or their limit of rays ends it")
+      ->check(
+          [](const std::string& text) -> std::string {
+            const auto estimator = radbake::study::pair_estimator_by_name(text);
+            return estimator.ok() ? "" : estimator.error().message;
+          },
+          "")
+      ->capture_default_str();
   factors->add_option("--json", form_factors.json, "Also write the results to this file");
   factors->footer("\nExample:\n  radbake-study form-factors tests/reference/form_factor_cases.json --tolerance 1e-6\n");
 
-  Choices enclosures{{}, 5e-11, {}};
+  Choices enclosures{{}, 5e-11, {}, {}};
   CLI::App* solve = app.add_subcommand("enclosures", "Enclosures with given form factors, by every solver");
   solve->add_option("CASES", enclosures.cases, "List of cases: F, areas, rho, E, B")->required();
   solve->add_option("--tolerance", enclosures.tolerance, "Error bound to stop at, over the mean radiosity")
@@ -75,7 +86,11 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
   if (factors->parsed()) {
-    return run(form_factors, radbake::study::study_form_factors, radbake::study::form_factor_table);
+    const auto estimator = radbake::study::pair_estimator_by_name(form_factors.estimator).value();
+    const auto study = [estimator](const Json& cases, double tolerance) {
+      return radbake::study::study_form_factors(cases, estimator, tolerance);
+    };
+    return run(form_factors, study, radbake::study::form_factor_table);
   }
   return run(enclosures, radbake::study::study_enclosures, radbake::study::enclosure_table);
 }

@@ -16,7 +16,7 @@ const char kSquares[] = R"([{"id": "squares", "from": 0, "to": 1, "occluders": [
   "polygons": [[[0,0,0],[1,0,0],[1,1,0],[0,1,0]], [[0,1,1],[1,1,1],[1,0,1],[0,0,1]]]}])";
 
 TEST(FormFactorStudy, ReportsValueErrorsAndMethod) {
-  const Json result = study_form_factors(Json::parse(kSquares), 1e-4);
+  const Json result = study_form_factors(Json::parse(kSquares), PairEstimator::kAnalytic, 1e-4);
   ASSERT_EQ(result["cases"].size(), 1U);
   const Json& found = result["cases"][0];
   EXPECT_NEAR(found["form_factor"].get<double>(), 0.19982489569838738, 1e-9);
@@ -28,13 +28,13 @@ TEST(FormFactorStudy, ReportsValueErrorsAndMethod) {
 TEST(FormFactorStudy, FailsACaseWhoseAnswerIsOff) {
   Json cases = Json::parse(kSquares);
   cases[0]["exact"] = 0.21;
-  EXPECT_FALSE(study_form_factors(cases, 1e-4)["cases"][0]["pass"].get<bool>());
+  EXPECT_FALSE(study_form_factors(cases, PairEstimator::kAnalytic, 1e-4)["cases"][0]["pass"].get<bool>());
 }
 
 TEST(FormFactorStudy, JudgesNoCaseWithoutAKnownAnswer) {
   Json cases = Json::parse(kSquares);
   cases[0].erase("exact");
-  const Json found = study_form_factors(cases, 1e-4)["cases"][0];
+  const Json found = study_form_factors(cases, PairEstimator::kAnalytic, 1e-4)["cases"][0];
   EXPECT_TRUE(found["true_error"].is_null());
   EXPECT_TRUE(found["pass"].is_null());
   EXPECT_FALSE(found["form_factor"].is_null());
@@ -44,7 +44,7 @@ TEST(FormFactorStudy, RefusesACaseAndGoesOnWithTheOthers) {
   Json cases = Json::parse(kSquares);
   cases.push_back(cases[0]);
   cases[0]["to"] = 7;
-  const Json result = study_form_factors(cases, 1e-4);
+  const Json result = study_form_factors(cases, PairEstimator::kAnalytic, 1e-4);
   EXPECT_TRUE(result["cases"][0]["form_factor"].is_null());
   EXPECT_NE(result["cases"][0]["error"].get<std::string>().find("to is 7"), std::string::npos);
   EXPECT_TRUE(result["cases"][1]["pass"].get<bool>());

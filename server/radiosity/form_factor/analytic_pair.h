@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "server/radiosity/form_factor/analytic_exchange.h"
+#include "server/radiosity/form_factor/analytic_occluders.h"
+
+namespace radbake::radiosity {
+
+/// A F between two convex pieces, how it was found and how far from exact it may be.
+struct PairExchange : Exchange {
+  AnalyticMethod method = AnalyticMethod::kZero;
+};
+
+/// A F of two convex pieces behind those occluders of which `candidates` are the indices.
+///
+/// Clips each piece to the front of the other, finds which candidates reach the lines between them, then the first that
+/// fits: nothing left 0; nothing between, the kernel or the contour; else the open value less what the occluders hide,
+/// by pairs of edges (hidden_exchange); where that does not end, the outer integral over what is visible.
+/// The error includes corners known to 8 ulp. A value that is not above its error is 0.
+///
+/// Units:  tolerance in those of A F; it bounds the error of occluded pairs.
+/// Errors: precondition: the pieces do not coincide face to face; candidates hold every occluder between them.
+/// Occluders
+///         in the plane of a piece count for nothing here.
+PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occluders& occluders,
+                           std::span<const std::uint32_t> candidates, double tolerance);
+
+/// Light from p to q that passes through one occluder: parts of the pieces on its two sides, and its part between them.
+/// All three counter-clockwise about the lines from p to q.
+struct Passing {
+  PolygonCorners p, between, q;
+  HalfSpace ahead;         ///< where lines go to when they have passed
+  std::uint32_t item = 0;  ///< occluders of one body, or the two sides of one polygon, have one item
+  std::uint32_t occluder = 0;
+  bool is_whole = false;   ///< p and q are all of the pieces
+  bool hides_all = false;  ///< all lines from p to q pass through it
+};
+
+/// A F of the lines from p to q that pass through any occluder: inclusion and exclusion over the chains of occluders of
+/// different items that lines pass one after the other.
+/// Errors: the error is infinite where there are too many chains.
+Exchange hidden_exchange(std::span<const Passing> passings, double tolerance);
+
+/// How much A F can change while the corners of `moved` move by at most `near`.
+///
+///   |d(A F)| <= near sum over edges of length min(1, A_seen/(pi d^2)),  d: the least distance of edge and `seen`
+///
+/// The light of `seen` is a field without sources, at most 1: its flux through a polygon depends on the outline only.
+double movement_error(const PolygonCorners& moved, double near, const PolygonCorners& seen);
+
+}  // namespace radbake::radiosity

@@ -112,7 +112,6 @@ const char* analytic_method_name(AnalyticMethod method) {
     case AnalyticMethod::kKernel: return "kernel";
     case AnalyticMethod::kContour: return "contour";
     case AnalyticMethod::kQuadrature: return "quadrature";
-    case AnalyticMethod::kHidden: return "hidden";
     case AnalyticMethod::kOccluded: return "occluded";
   }
   return "unknown";

@@ -17,8 +17,7 @@ enum class AnalyticMethod {
   kKernel,      ///< far and small: Gauss rules on both patches
   kContour,     ///< double contour integral
   kQuadrature,  ///< Lambert's formula over the smaller patch: where the contour cancels
-  kHidden,      ///< the open value less what passes through occluders: integrals over pairs of edges
-  kOccluded,    ///< Lambert's formula of what is visible over one patch
+  kOccluded,    ///< the open value less what occluders hide, or Lambert's formula of what is visible over one patch
 };
 const char* analytic_method_name(AnalyticMethod method);
 
@@ -34,10 +33,10 @@ struct PolygonFormFactor {
 ///   F = 1/(pi A_from) int_from int_to cos cos' V / r^2
 ///
 /// Unoccluded parts: 1/(2 pi A) oint oint ln r dr.dr', or Gauss rules on both patches where they are far apart.
-/// Occluded: that, less the light on lines that pass through occluders, by integrals over pairs of edges; where occluders
-/// are too many or tangled, Lambert's formula of what is visible from a point, integrated over the patch that is further
-/// from them. `tolerance` bounds the error of the occluded part; unoccluded ones end near rounding. What does not exceed
-/// its error is given as 0.
+/// Occluded: that, less the light on lines that pass through occluders, by integrals over pairs of edges; where
+/// occluders are too many or tangled, Lambert's formula of what is visible from a point, integrated over the patch that
+/// is further from them. `tolerance` bounds the error of the occluded part; unoccluded ones end near rounding. What
+/// does not exceed its error is given as 0.
 ///
 /// Occluders are two-sided and have no thickness. Neither patch may be among them. Policies:
 /// * An occluder in the plane of a patch lies on its front and covers it: the limit as it comes from the other patch.
@@ -52,7 +51,8 @@ struct PolygonFormFactor {
 ///         what is visible from the points of their cells, at least 128: light visible from a smaller share can be
 ///         missed.
 /// Cost:   unoccluded: 10 to 200 microseconds; behind a few occluders: 50 to 700; else milliseconds and more.
-/// Source: Lambert 1760; Schroeder & Hanrahan 1993 (contour); Santalo 1976 (measure of lines); Walton 2002, NISTIR 6925.
+/// Source: Lambert 1760; Schroeder & Hanrahan 1993 (contour); Santalo 1976 (measure of lines); Walton 2002, NISTIR
+/// 6925.
 Result<PolygonFormFactor> polygon_form_factor(std::span<const Vec3> from, std::span<const Vec3> to,
                                               std::span<const PolygonCorners> occluders, double tolerance = 1e-4);
 

@@ -14,6 +14,8 @@ constexpr long kMostEvaluations = 4'000'000;
 // what is promised.
 constexpr double kContourError = 1e-10, kContourRelativeError = 1e-9;
 constexpr double kUnoccludedError = 1e-12;
+// Of the open value: above it, what is left of a far pair would have no digits, and the visible part is integrated.
+constexpr double kMostHiddenError = 1e-2;
 
 /// Whether one convex occluder covers the whole shaft: every corner's view of every corner.
 bool hides_all(const Piece& occluder, const Piece& p, const Piece& q) {
@@ -205,24 +207,30 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
   }
 
   PairExchange result;
+  bool is_difference = false;
   if (in_shaft.empty()) {
     result = unoccluded_exchange(p, q);
   } else {
-    result.error = std::numeric_limits<double>::infinity();
+    result = {{0, std::numeric_limits<double>::infinity(), 0}, AnalyticMethod::kOccluded};
+    double open_value = 0;
+    is_difference = true;
     if (!finder.is_tangled()) {
       // What is open, less what is hidden.
       const PairExchange open = unoccluded_exchange(p, q);
       const Exchange hidden = hidden_exchange(finder.passings(), tolerance / 2);
+      open_value = open.value;
       result.value = open.value - hidden.value;
       result.error = open.error + hidden.error;
       result.evaluations = open.evaluations + hidden.evaluations;
-      result.method = AnalyticMethod::kHidden;
     }
-    if (!(result.error <= tolerance)) {
+    if (!(result.error <= std::min(tolerance, kMostHiddenError * open_value))) {
       std::vector<Piece> pieces;
       for (const std::uint32_t k : in_shaft) pieces.push_back(occluders.pieces()[k]);
       const Exchange visible = visible_past(p, q, pieces, tolerance);
-      if (visible.error < result.error) result = {visible, AnalyticMethod::kOccluded};
+      if (visible.error <= std::max(tolerance, result.error)) {
+        result = {visible, AnalyticMethod::kOccluded};
+        is_difference = false;
+      }
     }
   }
 
@@ -233,8 +241,8 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
     const Piece& occluder = occluders.pieces()[k];
     given += occluder.front.near * perimeter(occluder.corners);
   }
-  if (result.value > 0 || result.method == AnalyticMethod::kHidden) result.error += given;
-  if (result.method == AnalyticMethod::kHidden && result.value <= result.error) {
+  if (result.value > 0 || result.error > 0) result.error += given;
+  if (is_difference && result.value <= result.error) {
     result.error += std::max(result.value, 0.0);
     result.value = 0;
   }

@@ -18,7 +18,7 @@ struct PairExchange : Exchange {
 /// Clips each piece to the front of the other, finds which candidates reach the lines between them, then the first that
 /// fits: nothing left 0; nothing between, the kernel or the contour; else the open value less what the occluders hide,
 /// by pairs of edges (hidden_exchange); where that does not end, the outer integral over what is visible.
-/// The error includes corners known to 8 ulp. A value that is not above its error is 0.
+/// The error includes corners known to 8 ulp. A difference that is not above its error is 0.
 ///
 /// Units:  tolerance in those of A F; it bounds the error of occluded pairs.
 /// Errors: precondition: the pieces do not coincide face to face; candidates hold every occluder between them.

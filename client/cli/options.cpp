@@ -2,84 +2,20 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <map>
 #include <sstream>
 
 #include "client/cli/exit_code.h"
 #include "client/cli/help_texts.h"
-#include "client/cli/values.h"
+#include "client/options/words.h"
 #include "common/base/version.h"
 
 namespace radbake::cli {
 namespace {
 
-constexpr std::uint32_t kMinAtlasSize = 64, kMaxAtlasSize = 4096;
-constexpr double kMinDensity = 1e-3, kMaxDensity = 1e5;
-const std::map<std::string, v1::LightmapUv> kLightmapUvs = {
-    {"auto", v1::LIGHTMAP_UV_AUTO}, {"keep", v1::LIGHTMAP_UV_KEEP}, {"unwrap", v1::LIGHTMAP_UV_UNWRAP}};
-const std::map<std::string, v1::Output> kOutputs = {
-    {"lightmap", v1::OUTPUT_LIGHTMAP}, {"vertices", v1::OUTPUT_VERTICES}, {"both", v1::OUTPUT_BOTH}};
 const std::map<std::string, Encoding> kEncodings = {
     {"exr", Encoding::kExr}, {"hdr", Encoding::kHdr}, {"png-rgbm", Encoding::kRgbmPng}};
-
-/// The value of a parser, or CLI11's exception, which never leaves this file.
-template <typename T>
-T value_or_throw(const char* option, Result<T> parsed) {
-  if (!parsed.ok()) throw CLI::ValidationError(option, parsed.error().message);
-  return std::move(parsed).value();
-}
-
-/// The value of a word; CLI11's exception names the words that there are.
-template <typename T>
-T word_or_throw(const char* option, const std::map<std::string, T>& words, const std::string& text) {
-  const auto it = words.find(text);
-  if (it != words.end()) return it->second;
-  std::string known;
-  for (const auto& [word, value] : words) known += (known.empty() ? "" : ", ") + word;
-  throw CLI::ValidationError(option, "'" + text + "' is none of " + known);
-}
-
-bool is_all_digits(const std::string& text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
-}
-
-std::string check_positive(const std::string& text) {
-  const unsigned long long value = std::strtoull(text.c_str(), nullptr, 10);
-  if (is_all_digits(text) && value >= 1 && value <= UINT32_MAX) return "";
-  return "'" + text + "' is not a whole number from 1 to " + std::to_string(UINT32_MAX);
-}
-
-std::string check_atlas_size(const std::string& text) {
-  const unsigned long size = std::strtoul(text.c_str(), nullptr, 10);
-  const bool is_power_of_two = (size & (size - 1)) == 0;
-  if (is_all_digits(text) && is_power_of_two && size >= kMinAtlasSize && size <= kMaxAtlasSize) return "";
-  return "'" + text + "' is not a power of two from " + std::to_string(kMinAtlasSize) + " to " +
-         std::to_string(kMaxAtlasSize);
-}
-
-// CLI11 takes -1 for the largest unsigned number.
-std::string check_seed(const std::string& text) {
-  errno = 0;
-  std::strtoull(text.c_str(), nullptr, 10);
-  if (is_all_digits(text) && errno == 0) return "";
-  return "'" + text + "' is not a whole number from 0 to " + std::to_string(UINT64_MAX);
-}
-
-std::string check_density(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (!text.empty() && *end == '\0' && value >= kMinDensity && value <= kMaxDensity) return "";
-  return "'" + text + "' is not a number from 0.001 to 100000";
-}
-
-std::string check_reflectance(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (!text.empty() && *end == '\0' && value >= 0 && value < 1) return "";
-  return "'" + text + "' is not a number from 0 to below 1";
-}
 
 class Parser {
  public:
@@ -168,7 +104,7 @@ class Parser {
     std::vector<Encoding> encodings;
     std::istringstream words(text + ",");
     for (std::string word; std::getline(words, word, ',');) {
-      const Encoding encoding = word_or_throw("--encoding", kEncodings, word);
+      const Encoding encoding = options::word_or_throw("--encoding", kEncodings, word);
       const bool is_new = std::find(encodings.begin(), encodings.end(), encoding) == encodings.end();
       if (is_new) encodings.push_back(encoding);
     }
@@ -177,61 +113,10 @@ class Parser {
 
   void add_submit() {
     CLI::App* sub = add_command(Command::kSubmit, "submit", "Bake a glTF scene", kSubmitFooter);
-    BakeChoices& bake = line_.bake;
     sub->add_option("SCENE", line_.scene, "A .glb or .gltf file")->required()->type_name("");
     add_folder(sub);
-    sub->add_option_function<std::string>(
-           "--output", [&bake](const std::string& text) { bake.output = word_or_throw("--output", kOutputs, text); },
-           "What receives the light: lightmap (images), vertices (of the meshes, in scene.glb) or both; default: "
-           "lightmap")
-        ->type_name("WHAT");
-    sub->add_option_function<std::string>(
-           "--lightmap-uv",
-           [&bake](const std::string& text) { bake.lightmap_uv = word_or_throw("--lightmap-uv", kLightmapUvs, text); },
-           "The lightmap's layout: auto keeps each mesh's own TEXCOORD_1 where it is valid (inside 0..1, no overlap) "
-           "and unwraps the others; keep refuses a mesh without a valid one; unwrap makes all anew; default: auto")
-        ->type_name("HOW");
-    sub->add_option(
-           "--texels-per-meter", bake.texels_per_meter,
-           "Density of the lightmap; an object's own factor on it is radbake_texel_density in the extras of its "
-           "node or mesh; default: 32, or less, with a warning, where the scene is too large for that")
-        ->check(check_density, "")
-        ->type_name("D");
-    sub->add_option("--atlas-size", bake.atlas_size,
-                    "Size of a lightmap's sheet: texels along a side, a power of two from 64 to 4096; where one is "
-                    "full, another is begun; default: as small as holds the scene at that density")
-        ->check(check_atlas_size, "")
-        ->type_name("N");
+    options::add_bake_options(*sub, line_.bake);
     add_files(sub);
-    sub->add_option_function<std::string>(
-           "--sky", [&bake](const std::string& text) { bake.sky = value_or_throw("--sky", parse_rgb(text)); },
-           "Light from a constant sky: luminance in nit, linear Rec.709")
-        ->type_name("R,G,B");
-    sub->add_option_function<std::string>(
-           "--sun", [&bake](const std::string& text) { bake.sun = value_or_throw("--sun", parse_sun(text)); },
-           "Light from a sun: the direction in which it travels (glTF's world, +Y is up) and its illuminance in lx on "
-           "a facing surface")
-        ->type_name("DX,DY,DZ:R,G,B");
-    sub->add_option("--rays", bake.rays,
-                    "Hemisphere rays a texel; a patch's row gets the same; default: the server's, 256")
-        ->check(check_positive, "")
-        ->type_name("N");
-    sub->add_option("--max-patches", bake.max_patches,
-                    "Bound on the number of patches, the senders of light; default: the server's, 16384")
-        ->check(check_positive, "")
-        ->type_name("N");
-    sub->add_option("--max-reflectance", bake.max_reflectance,
-                    "Limit on the materials' reflectance, since white surfaces that lose nothing never settle")
-        ->check(check_reflectance, "")
-        ->capture_default_str()
-        ->type_name("R");
-    sub->add_option("--threads", bake.threads, "Threads of the bake; changes no result; default: all cores")
-        ->check(check_positive, "")
-        ->type_name("N");
-    sub->add_option("--seed", bake.seed, "Seed of the random numbers")
-        ->check(check_seed, "")
-        ->capture_default_str()
-        ->type_name("N");
   }
 
   CommandLine line_;

@@ -1,33 +1,17 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "common/scene/scene.h"
-#include "radbake/v1/settings.pb.h"
+#include "client/options/bake_options.h"
 
 namespace radbake::cli {
 
 enum class Command { kSubmit, kList, kWatch, kCancel, kDownload, kCapabilities };
 
-/// What decides a bake. Zero means: the server's default.
-struct BakeChoices {
-  std::uint32_t atlas_size = 0;
-  double texels_per_meter = 0;
-  v1::LightmapUv lightmap_uv = v1::LIGHTMAP_UV_AUTO;
-  v1::Output output = v1::OUTPUT_LIGHTMAP;
-  std::uint32_t rays = 0;
-  std::uint32_t max_patches = 0;
-  std::uint64_t seed = 0;
-  std::uint32_t threads = 0;
-  double max_reflectance = 0.98;
-  std::optional<Vec3> sky;
-  std::optional<DirectionalLight> sun;
-};
+using options::BakeChoices;
 
 /// A kind of image file.
 enum class Encoding { kExr, kHdr, kRgbmPng };

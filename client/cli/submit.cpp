@@ -6,9 +6,9 @@
 #include "client/cli/proto_json.h"
 #include "client/cli/results.h"
 #include "client/cli/scene_file.h"
-#include "client/cli/scene_light.h"
 #include "client/gltf/read_gltf.h"
 #include "client/image/image_codec.h"
+#include "client/options/scene_light.h"
 #include "common/codec/scene_codec.h"
 
 namespace radbake::cli {
@@ -33,15 +33,8 @@ v1::SubmitBakeRequest make_request(const CommandLine& line, const Digest& manife
   request.set_request_id(api::make_request_id());
   request.mutable_manifest()->set_sha256(manifest.sha256);
   request.mutable_manifest()->set_size_bytes(manifest.size_bytes);
-  v1::BakeSettings& settings = *request.mutable_settings();
-  settings.set_atlas_size(line.bake.atlas_size);
-  settings.set_rays(line.bake.rays);
-  settings.set_max_patches(line.bake.max_patches);
-  settings.set_seed(line.bake.seed);
-  settings.set_texels_per_meter(line.bake.texels_per_meter);
-  settings.set_lightmap_uv(line.bake.lightmap_uv);
-  settings.set_output(line.bake.output);
-  request.mutable_run()->set_threads(line.bake.threads);
+  *request.mutable_settings() = options::to_settings(line.bake);
+  *request.mutable_run() = options::to_run_options(line.bake);
   // Protobuf's texts are UTF-8, file names are bytes.
   request.set_label(to_utf8(line.scene.filename().string()));
   return request;
@@ -60,9 +53,9 @@ Result<Prepared> prepare(const CommandContext& context, Stopwatch& stages) {
   const std::stop_token stop = context.interrupt.once();
   context.reporter.stage("reading", -1);
   RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, read_scene(line.scene, line.bake.max_reflectance));
-  add_sky_and_sun(line.bake.sky, line.bake.sun, read.scene);
+  options::add_sky_and_sun(line.bake.sky, line.bake.sun, read.scene);
   for (const Warning& warning : read.warnings) context.reporter.warning(warning);
-  RADBAKE_RETURN_IF_ERROR(require_light(read.scene, line.scene.filename().string()));
+  RADBAKE_RETURN_IF_ERROR(options::require_light(read.scene, line.scene.filename().string()));
   SceneReport report;
   report.num_triangles_dropped = read.num_triangles_dropped;
   report.warnings = std::move(read.warnings);

@@ -121,11 +121,18 @@ Result<std::shared_ptr<Job>> JobQueue::cancel(const std::string& name) {
   return job;
 }
 
+void JobQueue::request_cancel(WorkerRun& run) {
+  run.request_cancel();
+  // Lets the watchdog look more often from now on. Under the lock, so that it is not between its look and its wait.
+  const std::lock_guard lock(mutex_);
+  runs_changed_.notify_all();
+}
+
 Result<void> JobQueue::cancel_live(const std::string& name) {
   const std::shared_ptr<Job> job = find_live(name);
   if (!job) return {};
   if (const auto run = find_run(name)) {
-    run->request_cancel();
+    request_cancel(*run);
     return {};
   }
   std::erase(waiting_, job);
@@ -336,7 +343,7 @@ Result<std::string> JobQueue::start_plan_run(const store::Work& work, PlanDone o
 
 void JobQueue::cancel_plan(const std::string& name) {
   thread_.post([this, name] {
-    if (const auto run = find_run(name)) run->request_cancel();
+    if (const auto run = find_run(name)) request_cancel(*run);
   });
 }
 
@@ -364,7 +371,16 @@ void JobQueue::watch_limits(std::stop_token stop) {
       runs_changed_.wait(lock, stop, [this] { return !runs_.empty(); });
       continue;
     }
-    runs_changed_.wait_for(lock, stop, options_.check_interval, [] { return false; });
+    // A worker that was asked to stop has little time: look at it often.
+    constexpr std::chrono::milliseconds kCancelCheck{5};
+    const auto is_cancelling = [this] {
+      return std::any_of(runs_.begin(), runs_.end(), [](const auto& run) { return run.second->is_cancel_requested(); });
+    };
+    if (is_cancelling()) {
+      runs_changed_.wait_for(lock, stop, kCancelCheck, [] { return false; });
+    } else {
+      runs_changed_.wait_for(lock, stop, options_.check_interval, is_cancelling);
+    }
     const auto runs = runs_;
     lock.unlock();
     for (const auto& [name, run] : runs) run->check(WorkerRun::Clock::now());

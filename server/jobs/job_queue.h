@@ -83,6 +83,7 @@ class JobQueue {
   Result<void> recover();
   Result<std::shared_ptr<Job>> accept_job(const store::NewJob& job);
   Result<void> cancel_live(const std::string& name);
+  void request_cancel(WorkerRun& run);
   void run_waiting_jobs();
   void start_job(const std::shared_ptr<Job>& job);
   Result<std::string> start_plan_run(const store::Work& work, PlanDone on_done);

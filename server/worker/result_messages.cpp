@@ -42,6 +42,13 @@ v1::SolverReport to_message(const radiosity::SolverSummary& solver) {
   out.set_error_bound(solver.error_bound);
   out.set_relative_error_bound(solver.relative_error_bound);
   out.set_tolerance(solver.tolerance);
+  for (const radiosity::SolverSummary::Point& point : solver.history) {
+    v1::SolverPoint& to = *out.add_history();
+    to.set_steps(point.steps);
+    to.set_rows(point.rows);
+    to.set_residual(point.residual);
+    to.set_relative_error_bound(point.relative_error_bound);
+  }
   return out;
 }
 
@@ -68,6 +75,8 @@ v1::TransportReport to_message(const radiosity::TransportSummary& transport) {
   out.set_scaling_sweeps(static_cast<std::uint32_t>(transport.scaling_sweeps));
   out.set_escape_share(transport.escape_share);
   out.set_absorbed_share(transport.absorbed_share);
+  out.set_row_error_max(transport.row_error_max);
+  out.set_num_rows_clipped(transport.num_rows_clipped);
   return out;
 }
 
@@ -110,16 +119,6 @@ v1::UvSource to_source(radiosity::UvSource source) {
   return v1::UV_NONE;
 }
 
-radiosity::LightmapUv to_lightmap_uv(v1::LightmapUv uv) {
-  if (uv == v1::LIGHTMAP_UV_KEEP) return radiosity::LightmapUv::kKeep;
-  return uv == v1::LIGHTMAP_UV_UNWRAP ? radiosity::LightmapUv::kUnwrap : radiosity::LightmapUv::kAuto;
-}
-
-radiosity::Output to_output(v1::Output output) {
-  if (output == v1::OUTPUT_VERTICES) return radiosity::Output::kVertices;
-  return output == v1::OUTPUT_BOTH ? radiosity::Output::kBoth : radiosity::Output::kLightmap;
-}
-
 template <typename T>
 void append(const std::vector<T>& values, std::string& data) {
   data.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
@@ -137,19 +136,6 @@ v1::BakeState to_state(radiosity::BakeStage stage) {
 
 }  // namespace
 
-radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::RunOptions& run) {
-  radiosity::BakeOptions options;
-  options.atlas_size = static_cast<int>(settings.atlas_size());
-  options.texels_per_meter = settings.texels_per_meter();
-  options.rays = static_cast<int>(settings.rays());
-  options.max_patches = static_cast<int>(settings.max_patches());
-  options.seed = settings.seed();
-  options.lightmap_uv = to_lightmap_uv(settings.lightmap_uv());
-  options.output = to_output(settings.output());
-  options.threads = static_cast<int>(run.threads());
-  return options;
-}
-
 v1::Plan to_message(const radiosity::BakePlan& plan) {
   v1::Plan out;
   *out.mutable_survey() = to_message(plan.survey);
@@ -162,9 +148,11 @@ v1::Plan to_message(const radiosity::BakePlan& plan) {
   out.set_rays_per_texel(static_cast<std::uint64_t>(plan.rays_per_texel));
   out.set_rays_per_row(static_cast<std::uint64_t>(plan.rays_per_row));
   out.set_light_samples_per_texel(static_cast<std::uint64_t>(plan.light_samples_per_texel));
-  out.set_estimator(plan.estimator);
-  out.set_transport(plan.transport);
-  out.set_solver(plan.solver);
+  out.set_estimator(radiosity::form_factors_name(plan.form_factors));
+  out.set_transport(radiosity::transport_name(plan.transport));
+  out.set_solver(radiosity::solver_name(plan.solver));
+  out.set_transport_bytes(plan.transport_bytes);
+  out.set_transport_bytes_limit(plan.transport_bytes_limit);
   out.set_texels_per_meter(plan.texels_per_meter);
   for (const Warning& warning : plan.warnings) *out.add_warnings() = to_message(warning);
   return out;

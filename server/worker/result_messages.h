@@ -5,14 +5,11 @@
 #include "radbake/v1/bake.pb.h"
 #include "radbake/v1/plan.pb.h"
 #include "radbake/v1/result.pb.h"
-#include "radbake/v1/settings.pb.h"
 #include "server/radiosity/bake/bake.h"
 
 namespace radbake::worker {
 
-/// The library's plain structs to and from the wire, field for field.
-
-radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::RunOptions& run);
+/// The library's plain structs to the wire, field for field.
 
 v1::Plan to_message(const radiosity::BakePlan& plan);
 v1::Progress to_message(const radiosity::BakeProgress& progress);

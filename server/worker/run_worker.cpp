@@ -16,6 +16,7 @@
 #include "common/base/limits.h"
 #include "common/base/version.h"
 #include "common/codec/scene_codec.h"
+#include "server/settings/to_options.h"
 #include "server/worker/input_blobs.h"
 #include "server/worker/report_stream.h"
 #include "server/worker/result_messages.h"
@@ -130,7 +131,7 @@ Result<v1::WorkerReport> plan(const v1::StartWork& start, ReportStream& stream) 
   RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
   RADBAKE_ASSIGN_OR_RETURN(
       const radiosity::BakePlan planned,
-      radiosity::plan_scene(scene, to_options(start.settings(), start.run()), stream.stop_token()));
+      radiosity::plan_scene(scene, settings::to_options(start.settings(), start.run()), stream.stop_token()));
   v1::WorkerReport report;
   *report.mutable_plan_finished() = to_message(planned);
   return report;
@@ -143,7 +144,7 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
   before.end();
 
-  const radiosity::BakeOptions options = to_options(start.settings(), start.run());
+  const radiosity::BakeOptions options = settings::to_options(start.settings(), start.run());
   StreamObserver observer(stream);
   const auto bake_began_at = Clock::now();
   RADBAKE_ASSIGN_OR_RETURN(const radiosity::BakeOutcome outcome,

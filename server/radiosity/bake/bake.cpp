@@ -3,19 +3,18 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <numbers>
+#include <limits>
 #include <optional>
 #include <thread>
 
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
+#include "server/radiosity/bake/radiosity_system.h"
 #include "server/radiosity/error/energy.h"
-#include "server/radiosity/form_factor/patch_rows.h"
 #include "server/radiosity/gather/gather.h"
 #include "server/radiosity/gather/gather_vertices.h"
 #include "server/radiosity/lightmap/level_seams.h"
 #include "server/radiosity/solve/solve.h"
-#include "server/radiosity/transport/sparse_operator.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -24,49 +23,17 @@ constexpr int kPadding = 2;  ///< texels around charts that get their neighbours
 
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
-/// The rows of all patches as counts, areas in metres.
-SampledRows collected_rows(const Patches& patches, double square_metres, std::vector<PatchRow>& rows) {
-  SampledRows sampled;
-  const std::size_t n = rows.size();
-  sampled.first.assign(1, 0);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    for (const PatchRow::Entry& entry : rows[i].entries) sampled.entries.push_back({entry.patch, entry.count});
-    sampled.first.push_back(sampled.entries.size());
-    sampled.counted.push_back(rows[i].counted);
-    sampled.escaped.push_back(rows[i].escaped);
-    sampled.absorbed.push_back(rows[i].absorbed);
-    sampled.areas.push_back(rows[i].counted > 0 ? patches.area(i) * rows[i].visible_share * square_metres : 0);
-    rows[i].entries = {};
+/// The course of a solve in so many points that a plot looks the same.
+std::vector<SolverSummary::Point> thinned(const std::vector<SolveStep>& history) {
+  constexpr std::size_t kMostPoints = 100;
+  std::vector<SolverSummary::Point> points;
+  const std::size_t step = history.size() / kMostPoints + 1;
+  for (std::size_t k = 0; k < history.size(); ++k) {
+    if (k % step != 0 && k + 1 != history.size()) continue;
+    points.push_back({static_cast<std::uint64_t>(history[k].steps), static_cast<std::uint64_t>(history[k].work),
+                      history[k].residual, history[k].relative_error_bound});
   }
-  return sampled;
-}
-
-/// The light on each patch and what it does with it. Shapes: all [patches].
-struct PatchLight {
-  RadiosityProblem problem;
-  std::vector<Vec3> glow, direct;
-  std::vector<double> direct_variances;
-};
-
-PatchLight patch_light(const std::vector<PatchRow>& rows, Vec3 sky) {
-  PatchLight light;
-  for (const PatchRow& row : rows) {
-    // The sky's part: what of the row escaped sees it.
-    const Vec3 from_sky = row.counted > 0 ? sky * (std::numbers::pi * row.escaped / row.counted) : Vec3{};
-    const Vec3 direct = row.direct + from_sky;
-    light.problem.source.push_back(row.glow + scaled_by(row.reflectance, direct));
-    light.problem.reflectance.push_back(row.reflectance);
-    light.glow.push_back(row.glow);
-    light.direct.push_back(direct);
-    light.direct_variances.push_back(row.direct_variance);
-  }
-  return light;
-}
-
-TransportSummary summary_of(const TransportRepair& repair) {
-  return {repair.num_entries,          repair.raw_reciprocity_rms,    repair.raw_closure_max,
-          repair.paired_row_error_rms, repair.repaired_row_error_max, repair.scaling_sweeps,
-          repair.escape_share,         repair.absorbed_share};
+  return points;
 }
 
 /// One bake, stage after stage, on the threads of the arena that it runs in.
@@ -88,17 +55,15 @@ class Bake {
 
     const Visibility& visibility = *prepared_.visibility;
     outcome_.report.instruction_set = visibility.instruction_set();
-    const HemisphereEstimator estimator(surfaces_, prepared_.patches, visibility, prepared_.plan.rays_per_row);
-    const DirectLight patch_direct(surfaces_, visibility, kLightSamplesPerPatch);
-
-    std::vector<PatchRow> rows = sample_patch_rows(
-        surfaces_, prepared_.patches, estimator, patch_direct, options_.seed,
+    auto system = make_radiosity_system(
+        prepared_, options_.seed, scene_.sky,
         [this](std::uint64_t done, std::uint64_t total) { progress_.report(BakeStage::kFormFactors, done, total); },
         stop_);
-    if (stop_.stop_requested()) return cancelled();
-    RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> radiosity, solve(rows, patch_direct.emitted_lumens()));
-    rows = {};
+    if (!system.ok()) return system.error();
+    RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> radiosity, solve(**system));
+    system->reset();
 
+    const HemisphereEstimator estimator(surfaces_, prepared_.patches, visibility, prepared_.plan.rays_per_texel);
     const DirectLight receiver_direct(surfaces_, visibility, kLightSamplesPerTexel);
     const GatherScene scene{surfaces_, visibility, estimator, receiver_direct, radiosity, scene_.sky, options_.seed};
     if (!gather(scene)) return cancelled();
@@ -107,42 +72,45 @@ class Bake {
   }
 
  private:
-  /// Rows -> operator -> radiosity, with the report's transport, solver and energy.
-  Result<std::vector<Vec3>> solve(std::vector<PatchRow>& rows, double light_flux) {
+  /// System -> radiosity, with the report's transport, solver and energy.
+  Result<std::vector<Vec3>> solve(const RadiositySystem& system) {
     BakeReport& report = outcome_.report;
     progress_.report(BakeStage::kSolving, 0, 0);
-    for (const PatchRow& row : rows) {
-      report.num_row_rays += row.traced;
-      report.num_light_rays += row.light_rays;
-    }
-    const double square_metres = surfaces_.metres_per_unit * surfaces_.metres_per_unit;
-    const SparseOperator transport(collected_rows(prepared_.patches, square_metres, rows));
-    report.transport = summary_of(transport.repair());
+    report.num_row_rays = system.num_row_rays;
+    report.num_light_rays = system.num_light_rays;
+    report.transport = system.summary;
 
-    const PatchLight light = patch_light(rows, scene_.sky);
-    std::vector<Vec3> radiosity = light.problem.source;
-    const SolveOptions options;
-    const SolveReport solved = solve_gauss_seidel(
-        transport, light.problem, options, radiosity,
-        [this](int sweep, double bound) { progress_.report(BakeStage::kSolving, sweep, 0, bound); }, stop_);
-    report.solver = {"gauss-seidel",
+    SolveOptions options;
+    options.max_sweeps = max_sweeps_of(report.plan.survey.max_reflectance, options.relative_tolerance);
+    options.max_lu_patches = std::numeric_limits<std::size_t>::max();  // never chosen but by name
+    std::vector<Vec3> radiosity = system.problem.source;
+    const SolveObserver show = [this](const SolveView& view) {
+      progress_.report(BakeStage::kSolving, static_cast<std::uint64_t>(view.step.steps), 0,
+                       view.step.relative_error_bound);
+    };
+    RADBAKE_ASSIGN_OR_RETURN(
+        const SolveReport solved,
+        radiosity::solve(report.plan.solver, *system.transport, system.problem, options, radiosity, show, stop_));
+    report.solver = {solver_name(solved.solver),
                      solve_status_name(solved.status),
                      solved.sweeps,
                      solved.residual,
                      solved.error_bound,
                      solved.relative_error_bound,
-                     options.relative_tolerance};
-    if (solved.status == SolveStatus::kCancelled) return cancelled();
+                     options.relative_tolerance,
+                     thinned(solved.history)};
+    if (stop_.stop_requested() || solved.status == SolveStatus::kCancelled) return cancelled();
     if (solved.status != SolveStatus::kConverged) {
-      return internal_error("the solver did not converge (" + report.solver.status + " after " +
-                            std::to_string(solved.sweeps) + " sweeps, residual " + std::to_string(solved.residual) +
+      return internal_error("the solver " + report.solver.solver + " did not converge (" + report.solver.status +
+                            " after " + std::to_string(solved.sweeps) + " sweeps, residual " +
+                            std::to_string(solved.residual) +
                             " lx): the scene passes on nearly all of its light; lower the largest reflectance, " +
-                            std::to_string(report.plan.survey.max_reflectance));
+                            std::to_string(report.plan.survey.max_reflectance) + ", or choose another --solver");
     }
-    EnergyTerms terms{radiosity, light.problem.reflectance, light.glow, light.direct, light.direct_variances};
-    terms.light_flux = light_flux;
+    EnergyTerms terms{radiosity, system.problem.reflectance, system.glow, system.direct, system.direct_variances};
+    terms.light_flux = system.emitted_lumens;
     terms.is_closed = report.transport.escape_share == 0 && report.transport.absorbed_share == 0;
-    const EnergyBalance balance = audit_energy(transport, terms);
+    const EnergyBalance balance = audit_energy(*system.transport, terms);
     report.energy = {balance.is_closed,
                      balance.emitted,
                      balance.absorbed,

@@ -49,6 +49,11 @@ struct SolverSummary {
   std::string status;
   int sweeps = 0;
   double residual = 0, error_bound = 0, relative_error_bound = 0, tolerance = 0;
+  struct Point {
+    std::uint64_t steps = 0, rows = 0;
+    double residual = 0, relative_error_bound = 0;
+  };
+  std::vector<Point> history;
 };
 
 /// Field for field radbake.v1.EnergyAudit, where the fields are explained.
@@ -64,6 +69,8 @@ struct TransportSummary {
   double raw_reciprocity_rms = 0, raw_closure_max = 0, paired_row_error_rms = 0, repaired_row_error_max = 0;
   int scaling_sweeps = 0;
   double escape_share = 0, absorbed_share = 0;
+  double row_error_max = 0;
+  std::uint64_t num_rows_clipped = 0;
 };
 
 /// Field for field radbake.v1.LightmapReport, where the fields are explained.

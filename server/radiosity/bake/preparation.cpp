@@ -28,7 +28,7 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
     area += surfaces.areas[t] * (surfaces.material(t).is_double_sided ? 2 : 1);
   }
-  const auto max_patches = static_cast<std::size_t>(options.max_patches > 0 ? options.max_patches : kDefaultMaxPatches);
+  const auto max_patches = static_cast<std::size_t>(max_patches_of(options));
   const double reached_density = prepared->atlas ? prepared->atlas->texels_per_meter() : density;
   const double texel_edge = 1 / (reached_density * surfaces.metres_per_unit);
   prepared->visibility = make_embree_visibility(surfaces.corners);
@@ -50,9 +50,7 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.rays_per_texel = options.rays > 0 ? options.rays : kDefaultRays;
   plan.rays_per_row = plan.rays_per_texel;
   plan.light_samples_per_texel = plan.survey.num_emitter_triangles > 0 ? kLightSamplesPerTexel : 0;
-  plan.estimator = "hemisphere";
-  plan.transport = "sparse";
-  plan.solver = "gauss-seidel";
+  choose_methods(options, plan);
   plan.texels_per_meter = reached_density;
   plan.warnings = prepared->surveyed.warnings;
   plan.warnings.insert(plan.warnings.end(), layout_warnings.begin(), layout_warnings.end());

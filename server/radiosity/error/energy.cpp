@@ -1,6 +1,7 @@
 #include "server/radiosity/error/energy.h"
 
 #include <cmath>
+#include <vector>
 
 namespace radbake::radiosity {
 
@@ -9,8 +10,10 @@ EnergyBalance audit_energy(const TransportOperator& transport, const EnergyTerms
   EnergyBalance balance;
   balance.is_closed = terms.is_closed;
   double sent = 0, arrived = 0, leaving = 0, glow = 0, absorbed = 0, direct = 0, variance = 0;
+  std::vector<Vec3> gathered(areas.size());
+  transport.gather(terms.radiosity, gathered);
   for (std::uint32_t i = 0; i < areas.size(); ++i) {
-    const Vec3 indirect = transport.gather_at(i, terms.radiosity);
+    const Vec3 indirect = gathered[i];
     const Vec3 irradiance = indirect + terms.direct[i];
     const double own = mean_component(terms.radiosity[i]);
     sent += areas[i] * own;

@@ -5,39 +5,64 @@
 #include <stop_token>
 #include <vector>
 
-#include "server/radiosity/form_factor/hemisphere.h"
+#include "common/base/sequence.h"
+#include "server/radiosity/form_factor/row_estimator.h"
 #include "server/radiosity/lights/direct_light.h"
+#include "server/radiosity/patches/patches.h"
 
 namespace radbake::radiosity {
 
-/// What a patch is as a sender and receiver, averaged over its visible part, and its row.
-struct PatchRow {
-  struct Entry {
-    std::uint32_t patch;
-    std::uint32_t count;  ///< rays that met it
-  };
-  std::vector<Entry> entries;  ///< ascending by patch
-  std::uint32_t counted = 0;   ///< rays of the row; 0: the patch was never reached, or is buried
-  std::uint32_t escaped = 0;
-  std::uint32_t absorbed = 0;
-  std::uint32_t traced = 0;
+/// What a patch is as a sender and receiver, averaged over its visible part.
+struct PatchSample {
+  double visible_share = 0;  ///< of its sites: those not buried; 0: the patch was never reached, or is buried
   std::uint32_t light_rays = 0;
-  double visible_share = 0;
   Vec3 reflectance;
   Vec3 glow;                   ///< E_in, lx
   Vec3 direct;                 ///< from emitters and lamps, lx
   double direct_variance = 0;  ///< of the mean of direct's channels
 };
 
-/// Samples the rows and the direct light of all front patches, and of those back patches that rays reach.
+/// Buffers that one thread reuses from patch to patch.
+struct PatchScratch {
+  std::vector<Site> sites;
+  std::vector<std::uint8_t> is_buried;
+  std::unique_ptr<RowScratch> row;
+  DirectLight::Scratch light;
+};
+
+/// Samples patches: their rows, and what they do with light. The same patch gives the same bits at any time, so that a
+/// row can be thrown away and made again.
+class PatchSampler {
+ public:
+  PatchSampler(const Surfaces& surfaces, const Patches& patches, const RowEstimator& estimator,
+               const DirectLight& direct, std::uint64_t seed);
+
+  std::size_t size() const { return patches_.size(); }
+  PatchScratch make_scratch() const { return {{}, {}, estimator_.make_scratch(), {}}; }
+
+  /// The form factors of a patch.
+  void sample_row(std::uint32_t patch, PatchScratch& scratch, const std::stop_token& stop, FormFactorRow& row) const;
+
+  /// Material and light of the patch whose row scratch was used for last.
+  PatchSample sample_light(std::uint32_t patch, PatchScratch& scratch) const;
+
+ private:
+  const Surfaces& surfaces_;
+  const Patches& patches_;
+  const RowEstimator& estimator_;
+  const DirectLight& direct_;
+  std::uint64_t seed_;
+  SobolPoints site_points_;
+};
+
+/// Samples all front patches, and those back patches that rows reach, and hands each to `take`.
 ///
-/// Shapes: returns [patches].
-/// on_row is called after each row, from any thread, with the number of rows done and known to be needed.
-/// Stopped early, the rest of the rows is empty.
-std::vector<PatchRow> sample_patch_rows(const Surfaces& surfaces, const Patches& patches,
-                                        const HemisphereEstimator& estimator, const DirectLight& direct,
-                                        std::uint64_t seed,
-                                        const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row,
-                                        std::stop_token stop);
+/// take(patch, row, sample) is called from any thread, once a patch; it may move the entries out of the row. Patches
+/// that no row reaches are not sampled. on_row is called after each row, from any thread, with the number of rows done
+/// and known to be needed. Stopped early, some are missing.
+void sample_patches(const PatchSampler& sampler, std::size_t num_fronts,
+                    const std::function<void(std::uint32_t, FormFactorRow&, const PatchSample&)>& take,
+                    const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row,
+                    const std::stop_token& stop);
 
 }  // namespace radbake::radiosity

@@ -53,7 +53,8 @@ class RowEstimator {
   /// other geometry (its material and light do not count). Replaces what row and is_buried hold.
   /// Errors: none; stopped early, the row means nothing.
   virtual void estimate(std::uint32_t patch, std::span<const Site> sites, std::uint64_t seed, RowScratch& scratch,
-                        const std::stop_token& stop, FormFactorRow& row, std::vector<std::uint8_t>& is_buried) const = 0;
+                        const std::stop_token& stop, FormFactorRow& row,
+                        std::vector<std::uint8_t>& is_buried) const = 0;
 };
 
 }  // namespace radbake::radiosity

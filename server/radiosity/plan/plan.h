@@ -1,18 +1,35 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/scene/scene.h"
 #include "server/radiosity/lightmap/layout.h"
+#include "server/radiosity/plan/transport_choice.h"
+#include "server/radiosity/solve/solve.h"
 #include "server/radiosity/survey/survey.h"
 
 namespace radbake::radiosity {
 
 /// What receives the light. Field for field radbake.v1.Output.
 enum class Output { kLightmap, kVertices, kBoth };
+
+/// How the form factors between patches are found. Field for field radbake.v1.FormFactors.
+enum class FormFactors { kAuto, kAnalytic, kHemicube, kHemisphere, kAdaptive };
+/// "auto", "analytic", "hemicube", "hemisphere", "adaptive".
+inline const char* form_factors_name(FormFactors method) {
+  switch (method) {
+    case FormFactors::kAuto: return "auto";
+    case FormFactors::kAnalytic: return "analytic";
+    case FormFactors::kHemicube: return "hemicube";
+    case FormFactors::kHemisphere: return "hemisphere";
+    case FormFactors::kAdaptive: return "adaptive";
+  }
+  return "unknown";
+}
 
 /// What a user may ask for. Zero means: choose.
 struct BakeOptions {
@@ -23,7 +40,11 @@ struct BakeOptions {
   std::uint64_t seed = 0;
   LightmapUv lightmap_uv = LightmapUv::kAuto;
   Output output = Output::kLightmap;
-  int threads = 0;  ///< 0: all cores; changes no result
+  FormFactors form_factors = FormFactors::kAuto;
+  Transport transport = Transport::kAuto;
+  std::optional<Solver> solver = std::nullopt;
+  std::uint64_t transport_memory = 0;  ///< bytes; bounds what Transport::kAuto picks
+  int threads = 0;                     ///< 0: all cores; changes no result
 };
 
 /// What a bake will do. Field for field radbake.v1.Plan.
@@ -38,10 +59,12 @@ struct BakePlan {
   int rays_per_texel = 0;
   int rays_per_row = 0;
   int light_samples_per_texel = 0;
-  std::string estimator;
-  std::string transport;
-  std::string solver;
-  double texels_per_meter = 0;  ///< median over the lit triangles
+  FormFactors form_factors = FormFactors::kHemisphere;  ///< never kAuto
+  Transport transport = Transport::kSparse;             ///< never kAuto
+  Solver solver = Solver::kGaussSeidel;
+  std::uint64_t transport_bytes = 0;        ///< that the form factors may take while they are put together
+  std::uint64_t transport_bytes_limit = 0;  ///< what kAuto had to keep
+  double texels_per_meter = 0;              ///< median over the lit triangles
   std::vector<Warning> warnings;
 };
 
@@ -53,6 +76,9 @@ inline constexpr int kMinRays = 8;
 inline constexpr int kMaxRays = 65536;
 inline constexpr int kDefaultMaxPatches = 16384;
 inline constexpr int kMinMaxPatches = 64;
+/// By formula every pair of patches has its price.
+inline constexpr int kDefaultMaxPatchesByFormula = 1024;
+inline constexpr std::uint64_t kDefaultTransportMemory = std::uint64_t{4} << 30;
 
 /// Shadow rays to emitters, a texel and a patch. A patch's estimate is averaged over many patches by every texel.
 inline constexpr int kLightSamplesPerTexel = 128;
@@ -60,6 +86,19 @@ inline constexpr int kLightSamplesPerPatch = 64;
 
 /// Errors: kInvalidArgument naming the option and the value. Zero is always right: it means choose.
 Result<void> check_options(const BakeOptions& options);
+
+/// The bound on patches that is asked for, or the default of the method.
+int max_patches_of(const BakeOptions& options);
+
+/// Chooses what options leave open: form factors, transport, solver. Needs the plan's survey, rays and patches.
+///
+/// Form factors: hemisphere rays. Solver: Gauss-Seidel; Krylov above a reflectance of 0.95, where sweeps grow in number
+/// like 1/(1 - rho), and where each sweep traces all rows again.
+void choose_methods(const BakeOptions& options, BakePlan& plan);
+
+/// Steps that a method may take: sweeps shrink the error by rho each, and as many again are allowed.
+/// max_sweeps of SolveOptions, at least its default. Units: tolerance relative.
+int max_sweeps_of(double max_reflectance, double tolerance);
 
 /// The wanted length of a patch's side: four texels (the second solve's detail comes from the texels), but at least
 /// kMinPatches on the whole scene and no more than asked for.

@@ -79,13 +79,7 @@ class ConjugateGradients {
   Vec3 square_;
 };
 
-double flux_of(std::span<const double> areas, std::span<const Vec3> radiosity) {
-  double flux = 0;
-  for (std::size_t i = 0; i < areas.size(); ++i) flux += areas[i] * mean_component(radiosity[i]);
-  return flux;
-}
-
-/// Cycles of conjugate directions; Gauss-Seidel where one has not halved the bound.
+/// Cycles of conjugate directions; where one has not halved the bound, what needs no reciprocity.
 void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
   ConjugateGradients gradients(monitor);
   std::vector<Vec3> irradiance;
@@ -108,14 +102,18 @@ void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
       if (!monitor.needs_no_look(residual, flux_of(monitor.transport().areas(), radiosity), radiosity)) break;
     }
     if (!monitor.goes_on(radiosity)) return;
-    if (monitor.relative_error_bound() > bound_before / 2) return solve_by_gauss_seidel(monitor, radiosity);
+    if (monitor.relative_error_bound() > bound_before / 2) return solve_by_bicgstab(monitor, radiosity);
   }
 }
 
 }  // namespace
 
 void solve_by_krylov(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
-  run_cycles(monitor, radiosity);
+  if (monitor.transport().is_reciprocal()) {
+    run_cycles(monitor, radiosity);
+  } else {
+    solve_by_bicgstab(monitor, radiosity);
+  }
   monitor.sharpen_bound();
 }
 

@@ -82,9 +82,9 @@ void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std:
       }
       largest->set(patches, keys);
       monitor.add_steps(1, 1);
-      // r = rho F dB: at most max|dB| max_i rho_i (F1)_i.
+      // r = rho F dB: its size is at most (1 - margin) that of dB.
       if (steps % steps_per_check == 0 &&
-          !monitor.needs_no_look((1 - monitor.margin()) * largest_component(unshot), flux, radiosity, unshot)) {
+          !monitor.needs_no_look((1 - monitor.margin()) * monitor.size_of(unshot), flux, radiosity, unshot)) {
         is_unshot_known = false;
         break;
       }

@@ -7,41 +7,6 @@
 #include "server/radiosity/solve/solve_monitor.h"
 
 namespace radbake::radiosity {
-namespace {
-
-SolveReport run(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
-                const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
-                std::stop_token stop) {
-  RADBAKE_CHECK_EQ(radiosity.size(), transport.size());
-  SolveMonitor monitor(solver, transport, problem, options, observe, std::move(stop));
-  std::vector<Vec3> unshot;
-  switch (solver) {
-    case Solver::kLu: solve_by_lu(monitor, radiosity); break;
-    case Solver::kJacobi: solve_by_jacobi(monitor, radiosity); break;
-    case Solver::kGaussSeidel: solve_by_gauss_seidel(monitor, radiosity); break;
-    case Solver::kSouthwell: solve_by_southwell(monitor, radiosity); break;
-    case Solver::kShooting: solve_by_shooting(monitor, radiosity, unshot); break;
-    case Solver::kKrylov: solve_by_krylov(monitor, radiosity); break;
-  }
-  SolveReport report = monitor.take_report();
-  report.unshot = std::move(unshot);
-  return report;
-}
-
-}  // namespace
-
-const char* solver_name(Solver solver) {
-  switch (solver) {
-    case Solver::kLu: return "lu";
-    case Solver::kJacobi: return "jacobi";
-    case Solver::kGaussSeidel: return "gauss-seidel";
-    case Solver::kSouthwell: return "southwell";
-    case Solver::kShooting: return "shooting";
-    case Solver::kKrylov: return "krylov";
-  }
-  return "unknown";
-}
-
 Result<Solver> solver_by_name(std::string_view name) {
   std::string names;
   for (const Solver solver : kAllSolvers) {
@@ -51,11 +16,9 @@ Result<Solver> solver_by_name(std::string_view name) {
   return invalid_argument("no solver is called '" + std::string(name) + "': choose one of " + names);
 }
 
-Solver default_solver(const RadiosityProblem& problem) {
+Solver default_solver(double max_reflectance) {
   constexpr double kManySweeps = 0.95;
-  const bool is_bright = std::any_of(problem.reflectance.begin(), problem.reflectance.end(),
-                                     [](const Vec3& rho) { return max_component(rho) > kManySweeps; });
-  return is_bright ? Solver::kKrylov : Solver::kGaussSeidel;
+  return max_reflectance > kManySweeps ? Solver::kKrylov : Solver::kGaussSeidel;
 }
 
 const char* solve_status_name(SolveStatus status) {
@@ -76,16 +39,21 @@ Result<SolveReport> solve(Solver solver, const TransportOperator& transport, con
     return invalid_argument("solver 'lu' is for at most " + std::to_string(options.max_lu_patches) +
                             " patches unless asked for by name; this scene has " + std::to_string(transport.size()));
   }
-  return run(solver, transport, problem, options, radiosity, observe, std::move(stop));
-}
-
-SolveReport solve_gauss_seidel(const TransportOperator& transport, const RadiosityProblem& problem,
-                               const SolveOptions& options, std::vector<Vec3>& radiosity,
-                               const std::function<void(int, double)>& observe, std::stop_token stop) {
-  const SolveObserver after_each_sweep = [&observe](const SolveView& view) {
-    if (observe && view.step.steps > 0) observe(static_cast<int>(view.step.steps), view.step.relative_error_bound);
-  };
-  return run(Solver::kGaussSeidel, transport, problem, options, radiosity, after_each_sweep, std::move(stop));
+  RADBAKE_CHECK_EQ(radiosity.size(), transport.size());
+  RADBAKE_CHECK(transport.is_reciprocal() || transport.is_by_columns() == reads_columns(solver));
+  SolveMonitor monitor(solver, transport, problem, options, observe, std::move(stop));
+  std::vector<Vec3> unshot;
+  switch (solver) {
+    case Solver::kLu: solve_by_lu(monitor, radiosity); break;
+    case Solver::kJacobi: solve_by_jacobi(monitor, radiosity); break;
+    case Solver::kGaussSeidel: solve_by_gauss_seidel(monitor, radiosity); break;
+    case Solver::kSouthwell: solve_by_southwell(monitor, radiosity); break;
+    case Solver::kShooting: solve_by_shooting(monitor, radiosity, unshot); break;
+    case Solver::kKrylov: solve_by_krylov(monitor, radiosity); break;
+  }
+  SolveReport report = monitor.take_report();
+  report.unshot = std::move(unshot);
+  return report;
 }
 
 std::vector<Vec3> ambient_display(std::span<const double> areas, std::span<const Vec3> reflectance,

@@ -27,13 +27,26 @@ inline constexpr Solver kAllSolvers[] = {Solver::kLu,        Solver::kJacobi,   
                                          Solver::kSouthwell, Solver::kShooting, Solver::kKrylov};
 
 /// "lu", "jacobi", "gauss-seidel", "southwell", "shooting", "krylov".
-const char* solver_name(Solver solver);
+inline const char* solver_name(Solver solver) {
+  switch (solver) {
+    case Solver::kLu: return "lu";
+    case Solver::kJacobi: return "jacobi";
+    case Solver::kGaussSeidel: return "gauss-seidel";
+    case Solver::kSouthwell: return "southwell";
+    case Solver::kShooting: return "shooting";
+    case Solver::kKrylov: return "krylov";
+  }
+  return "unknown";
+}
+
+/// Southwell and shooting; the others read rows.
+inline bool reads_columns(Solver solver) { return solver == Solver::kSouthwell || solver == Solver::kShooting; }
 
 /// Errors: invalid_argument that lists the names.
 Result<Solver> solver_by_name(std::string_view name);
 
 /// Gauss-Seidel; Krylov where a reflectance is above 0.95, as sweeps grow in number like 1 / (1 - rho).
-Solver default_solver(const RadiosityProblem& problem);
+Solver default_solver(double max_reflectance);
 
 inline constexpr std::size_t kMaxLuPatches = 1000;
 
@@ -95,23 +108,20 @@ using SolveObserver = std::function<void(const SolveView&)>;
 ///
 ///   max|B' - exact| <= (max|r| + rounding) / (1 - max_i rho_i (F1)_i)
 ///
+/// Of an operator that is known by columns (Southwell and shooting only, checked) |.| is the mean by area instead of
+/// the largest, and the divisor 1 - max_j sum_i A_i rho_i F_ij / A_j: light that is sent on.
+///
 /// Southwell and shooting read columns, the others rows. Every sum runs in a fixed order: equal bits for any number of
 /// threads. The clock decides only where a time budget ends a solve.
 /// Shapes: radiosity [n], in: first guess (0 gives the classic course of shooting), out: solution.
 /// Errors: invalid_argument for `lu` above options.max_lu_patches. Numbers that are not finite end as kDiverged.
 /// Cost:   one pass over the operator a sweep, and one for each look at the residual; `lu` n^3/3 and 16 n^2 bytes.
 /// Source: Goral et al. 1984 (lu); Cohen & Greenberg 1985 (gathering); Gortler, Cohen & Slusallek 1993 (southwell);
-///         Cohen, Chen, Wallace & Greenberg 1988 (shooting); Hestenes & Stiefel 1952 (krylov); Varah 1975 (the bound,
-///         for diagonally dominant matrices).
+///         Cohen, Chen, Wallace & Greenberg 1988 (shooting); Hestenes & Stiefel 1952, van der Vorst 1992 (krylov);
+///         Varah 1975 (the bound, for diagonally dominant matrices).
 Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
                           const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
                           std::stop_token stop);
-
-/// solve() by Gauss-Seidel, which nothing refuses. The observer is called after each sweep.
-SolveReport solve_gauss_seidel(const TransportOperator& transport, const RadiosityProblem& problem,
-                               const SolveOptions& options, std::vector<Vec3>& radiosity,
-                               const std::function<void(int sweep, double relative_error_bound)>& observe,
-                               std::stop_token stop);
 
 /// Radiosity to show while shooting is under way: unshot light is spread as if all patches saw each other evenly.
 ///

@@ -9,12 +9,9 @@
 namespace radbake::radiosity {
 namespace {
 
-constexpr std::size_t kRowsPerTask = 256;
 constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kGrowthThatMeansDivergence = 1e6;
-
-bool steps_are_patches(Solver solver) { return solver == Solver::kSouthwell || solver == Solver::kShooting; }
 
 }  // namespace
 
@@ -22,6 +19,12 @@ double largest_component(std::span<const Vec3> values) {
   double largest = 0;
   for (const Vec3& v : values) largest = std::max(largest, largest_component(v));
   return largest;
+}
+
+double flux_of(std::span<const double> areas, std::span<const Vec3> radiosity) {
+  double flux = 0;
+  for (std::size_t i = 0; i < areas.size(); ++i) flux += areas[i] * mean_component(radiosity[i]);
+  return flux;
 }
 
 SolveMonitor::SolveMonitor(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
@@ -39,14 +42,42 @@ SolveMonitor::SolveMonitor(Solver solver, const TransportOperator& transport, co
   RADBAKE_CHECK_EQ(problem.source.size(), transport.size());
   RADBAKE_CHECK_EQ(problem.reflectance.size(), transport.size());
   report_.solver = solver;
-  if (steps_are_patches(solver)) max_steps_ *= static_cast<std::int64_t>(transport.size());
-  // 1 - max_i rho_i (F1)_i: how far the system is from passing everything on.
+  if (reads_columns(solver)) max_steps_ *= static_cast<std::int64_t>(transport.size());
+  for (const double area : transport.areas()) area_ += area;
+  margin_ = 1 - (transport.is_by_columns() ? largest_share_sent_on() : largest_share_passed_on());
+}
+
+double SolveMonitor::largest_share_passed_on() const {
   double passed_on = 0;
-  for (std::uint32_t i = 0; i < transport.size(); ++i) {
-    passed_on = std::max(passed_on, max_component(problem.reflectance[i]) * transport.row_sum(i));
-    area_ += transport.areas()[i];
+  for (std::uint32_t i = 0; i < size(); ++i) {
+    passed_on = std::max(passed_on, max_component(problem_.reflectance[i]) * transport_.row_sum(i));
   }
-  margin_ = 1 - passed_on;
+  return passed_on;
+}
+
+double SolveMonitor::largest_share_sent_on() {
+  const auto areas = transport_.areas();
+  std::vector<double> sent_on(size(), 0);
+  for_each_range(size(), transport_.rows_per_task(), [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> patches;
+    std::vector<double> form_factors;
+    for (std::size_t j = begin; j < end && !is_cancelled(); ++j) {
+      transport_.column(static_cast<std::uint32_t>(j), patches, form_factors);
+      for (std::size_t k = 0; k < patches.size(); ++k) {
+        sent_on[j] += areas[patches[k]] * max_component(problem_.reflectance[patches[k]]) * form_factors[k];
+      }
+      if (areas[j] > 0) sent_on[j] /= areas[j];
+    }
+  });
+  report_.work += static_cast<std::int64_t>(size());
+  return sent_on.empty() ? 0 : *std::max_element(sent_on.begin(), sent_on.end());
+}
+
+double SolveMonitor::size_of(std::span<const Vec3> values) const {
+  if (!transport_.is_by_columns()) return largest_component(values);
+  double sum = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) sum += transport_.areas()[i] * largest_component(values[i]);
+  return area_ > 0 ? sum / area_ : 0;
 }
 
 double SolveMonitor::seconds() const {
@@ -60,12 +91,14 @@ void SolveMonitor::add_steps(std::int64_t steps, std::int64_t work) {
 
 bool SolveMonitor::look(std::span<const Vec3> radiosity) {
   RADBAKE_CHECK_EQ(radiosity.size(), size());
-  for_each_range(size(), kRowsPerTask, [&](std::size_t begin, std::size_t end) {
+  const bool is_by_columns = transport_.is_by_columns();
+  if (is_by_columns) transport_.gather(radiosity, irradiance_);
+  for_each_range(size(), transport_.rows_per_task(), [&](std::size_t begin, std::size_t end) {
     if (stop_.stop_requested()) return;
     for (std::size_t i = begin; i < end; ++i) {
       const auto patch = static_cast<std::uint32_t>(i);
       // r = source + rho F B' - B', and a bound on its own rounding: (n + 4) u times the sum of magnitudes.
-      irradiance_[i] = transport_.gather_at(patch, radiosity);
+      if (!is_by_columns) irradiance_[i] = transport_.gather_at(patch, radiosity);
       const Vec3 reflected = scaled_by(problem_.reflectance[i], irradiance_[i]);
       residuals_[i] = problem_.source[i] + reflected - radiosity[i];
       const Vec3 magnitude = problem_.source[i] + reflected + radiosity[i];
@@ -79,8 +112,14 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
   const auto areas = transport_.areas();
   report_.residual = rounding_ = flux_ = 0;
   for (std::size_t i = 0; i < size(); ++i) {
-    report_.residual = std::max(report_.residual, terms_[i].residual);
-    rounding_ = std::max(rounding_, terms_[i].rounding);
+    if (is_by_columns) {
+      const double share = area_ > 0 ? areas[i] / area_ : 0;
+      report_.residual += share * terms_[i].residual;
+      rounding_ += share * terms_[i].rounding;
+    } else {
+      report_.residual = std::max(report_.residual, terms_[i].residual);
+      rounding_ = std::max(rounding_, terms_[i].rounding);
+    }
     flux_ += areas[i] * mean_component(radiosity[i]);
   }
   const SolveStep now = step_of(report_.residual, flux_);
@@ -90,7 +129,7 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
 }
 
 bool SolveMonitor::gather(std::span<const Vec3> values, std::span<Vec3> gathered) {
-  for_each_range(size(), kRowsPerTask, [&](std::size_t begin, std::size_t end) {
+  for_each_range(size(), transport_.rows_per_task(), [&](std::size_t begin, std::size_t end) {
     if (stop_.stop_requested()) return;
     for (std::size_t i = begin; i < end; ++i) {
       gathered[i] = transport_.gather_at(static_cast<std::uint32_t>(i), values);
@@ -116,7 +155,7 @@ void SolveMonitor::record(double residual, double flux, bool always, std::span<c
   if (observe_) observe_({report_.history.back(), radiosity, unshot});
   constexpr std::int64_t kRecordsToDoubleSteps = 50;
   next_record_ = report_.steps + 1;
-  if (steps_are_patches(report_.solver)) next_record_ += report_.steps / kRecordsToDoubleSteps;
+  if (reads_columns(report_.solver)) next_record_ += report_.steps / kRecordsToDoubleSteps;
 }
 
 bool SolveMonitor::goes_on(std::span<const Vec3> radiosity, std::span<const Vec3> unshot) {
@@ -185,7 +224,7 @@ void SolveMonitor::sharpen_bound() {
 
 SolveReport SolveMonitor::take_report() {
   const auto n = static_cast<std::int64_t>(std::max<std::size_t>(size(), 1));
-  report_.sweeps = static_cast<int>(steps_are_patches(report_.solver) ? report_.steps / n : report_.steps);
+  report_.sweeps = static_cast<int>(reads_columns(report_.solver) ? report_.steps / n : report_.steps);
   report_.seconds = seconds();
   return std::move(report_);
 }

@@ -36,6 +36,9 @@ class SolveMonitor {
 
   bool is_cancelled() const { return stop_.stop_requested(); }
 
+  /// The size of residuals in the norm of the bound: the largest; of operators known by columns the mean by area.
+  double size_of(std::span<const Vec3> values) const;
+
   /// Ends a solve that no step changes any more, or that was cancelled within one.
   void end_without_progress();
 
@@ -45,7 +48,7 @@ class SolveMonitor {
   double flux() const { return flux_; }
   double relative_error_bound() const { return report_.relative_error_bound; }
   std::int64_t steps() const { return report_.steps; }
-  /// 1 - max_i rho_i (F1)_i
+  /// 1 - max_i rho_i (F1)_i; of operators known by columns 1 - max_j sum_i A_i rho_i F_ij / A_j
   double margin() const { return margin_; }
 
   /// Sharpens the bound of the last look: (I - rho F)^-1 = sum_m (rho F)^m, its first k terms summed with their signs,
@@ -63,6 +66,8 @@ class SolveMonitor {
     double residual, rounding;
   };
   bool look(std::span<const Vec3> radiosity);
+  double largest_share_passed_on() const;
+  double largest_share_sent_on();
   void record(double residual, double flux, bool always, std::span<const Vec3> radiosity, std::span<const Vec3> unshot);
   SolveStep step_of(double residual, double flux) const;
   double seconds() const;
@@ -90,6 +95,9 @@ inline double largest_component(Vec3 v) {
 }
 double largest_component(std::span<const Vec3> values);
 
+/// sum_i A_i mean_component(B_i)
+double flux_of(std::span<const double> areas, std::span<const Vec3> radiosity);
+
 // The solvers; each leaves its last state in radiosity.
 void solve_by_lu(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
 void solve_by_jacobi(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
@@ -97,5 +105,6 @@ void solve_by_gauss_seidel(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
 void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
 void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std::vector<Vec3>& unshot);
 void solve_by_krylov(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
+void solve_by_bicgstab(SolveMonitor& monitor, std::vector<Vec3>& radiosity);
 
 }  // namespace radbake::radiosity

@@ -11,7 +11,8 @@ namespace radbake::radiosity {
 
 /// The form factors between patches, as an operator: geometry only, so another light needs no new rays.
 ///
-/// Rows serve gathering, columns shooting; both are of one matrix: F_ij of row(i) and of column(j) are equal bits.
+/// Rows serve gathering, columns shooting. Of a stored operator both are of one matrix: F_ij of row(i) and of column(j)
+/// are equal bits. Of a streamed one they are two estimates.
 class TransportOperator {
  public:
   virtual ~TransportOperator() = default;
@@ -38,7 +39,15 @@ class TransportOperator {
 
   /// H = F B for all patches, rows side by side on the threads; each row is gather_at's, bit for bit.
   /// Shapes: both [n], not the same array.
-  void gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const;
+  virtual void gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const;
+
+  /// Whether A_i F_ij = A_j F_ji, up to rounding, may be relied on.
+  virtual bool is_reciprocal() const { return true; }
+  /// Whether the matrix is known by its columns only: gather_at() and row() are then not of it, gather() and column()
+  /// are, and what bounds an error is that sum_i A_i F_ij <= A_j.
+  virtual bool is_by_columns() const { return false; }
+  /// Rows that are worth a task of their own.
+  virtual std::size_t rows_per_task() const { return 256; }
 
   std::size_t size() const { return areas().size(); }
 };

@@ -20,58 +20,53 @@ void for_each_row(std::size_t n, const Body& body) {
   });
 }
 
-/// The transpose of the counts, with rows in compressed form.
+/// The transpose of the weights, with rows in compressed form.
 struct Transposed {
   std::vector<std::uint64_t> first;
-  std::vector<SampledRows::Entry> entries;
+  std::vector<EstimatedRows::Entry> entries;
 
-  explicit Transposed(const SampledRows& rows) : first(rows.size() + 1, 0), entries(rows.entries.size()) {
+  explicit Transposed(const EstimatedRows& rows) : first(rows.size() + 1, 0), entries(rows.entries.size()) {
     for (const auto& entry : rows.entries) ++first[entry.patch + 1];
     for (std::size_t i = 0; i < rows.size(); ++i) first[i + 1] += first[i];
     std::vector<std::uint64_t> next(first.begin(), first.end() - 1);
     for (std::uint32_t i = 0; i < rows.size(); ++i) {
       for (std::uint64_t k = rows.first[i]; k < rows.first[i + 1]; ++k) {
-        entries[next[rows.entries[k].patch]++] = {i, rows.entries[k].count};
+        entries[next[rows.entries[k].patch]++] = {i, rows.entries[k].weight};
       }
     }
   }
 };
 
-/// Calls visit(j, c_ij, c_ji) for every patch j that row i or column i holds, ascending.
+/// Calls visit(j, w_ij, w_ji) for every patch j that row i or column i holds, ascending.
 template <typename Visit>
-void merge_row_and_column(const SampledRows& rows, const Transposed& columns, std::uint32_t i, const Visit& visit) {
+void merge_row_and_column(const EstimatedRows& rows, const Transposed& columns, std::uint32_t i, const Visit& visit) {
   std::uint64_t a = rows.first[i], b = columns.first[i];
   const std::uint64_t a_end = rows.first[i + 1], b_end = columns.first[i + 1];
   while (a < a_end || b < b_end) {
     const std::uint32_t ja = a < a_end ? rows.entries[a].patch : 0xffffffffu;
     const std::uint32_t jb = b < b_end ? columns.entries[b].patch : 0xffffffffu;
     const std::uint32_t j = std::min(ja, jb);
-    visit(j, ja == j ? rows.entries[a].count : 0u, jb == j ? columns.entries[b].count : 0u);
+    visit(j, ja == j ? rows.entries[a].weight : 0.0f, jb == j ? columns.entries[b].weight : 0.0f);
     a += ja == j;
     b += jb == j;
   }
 }
 
-double measured_row_sum(const SampledRows& rows, std::uint32_t i) {
-  if (rows.counted[i] == 0) return 0;
-  return 1 - static_cast<double>(rows.escaped[i] + rows.absorbed[i]) / rows.counted[i];
-}
-
 }  // namespace
 
-SparseOperator::SparseOperator(const SampledRows& rows) : areas_(rows.areas) {
+SparseOperator::SparseOperator(const EstimatedRows& rows) : areas_(rows.areas) {
   pair_estimates(rows);
   restore_row_sums(rows);
 }
 
-void SparseOperator::pair_estimates(const SampledRows& rows) {
+void SparseOperator::pair_estimates(const EstimatedRows& rows) {
   const std::size_t n = rows.size();
   const Transposed columns(rows);
   // Count, then fill, each row by itself.
   first_.assign(n + 1, 0);
   for_each_row(n, [&](std::uint32_t i) {
     std::uint64_t length = 0;
-    merge_row_and_column(rows, columns, i, [&](std::uint32_t, std::uint32_t, std::uint32_t) { ++length; });
+    merge_row_and_column(rows, columns, i, [&](std::uint32_t, float, float) { ++length; });
     first_[i + 1] = length;
   });
   for (std::size_t i = 0; i < n; ++i) first_[i + 1] += first_[i];
@@ -84,9 +79,9 @@ void SparseOperator::pair_estimates(const SampledRows& rows) {
   for_each_row(n, [&](std::uint32_t i) {
     std::uint64_t at = first_[i];
     const double wi = rays_per_area(i);
-    merge_row_and_column(rows, columns, i, [&](std::uint32_t j, std::uint32_t own, std::uint32_t other) {
+    merge_row_and_column(rows, columns, i, [&](std::uint32_t j, double own, double other) {
       const double wj = rays_per_area(j);
-      const double exchange = wi + wj > 0 ? (static_cast<double>(own) + other) / (wi + wj) : 0;
+      const double exchange = wi + wj > 0 ? (own + other) / (wi + wj) : 0;
       patches_[at] = j;
       exchange_[at++] = static_cast<float>(exchange);
       if (exchange > 0 && wi > 0 && wj > 0) {
@@ -111,19 +106,16 @@ double SparseOperator::scaled_row(std::uint32_t i) const {
   return sum * scale_[i];
 }
 
-void SparseOperator::restore_row_sums(const SampledRows& rows) {
+void SparseOperator::restore_row_sums(const EstimatedRows& rows) {
   const std::size_t n = rows.size();
   scale_.assign(n, 1);
   std::vector<double> target(n, 0), sums(n, 0);
   double area = 0, escaped = 0, absorbed = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
-    target[i] = areas_[i] * measured_row_sum(rows, i);
+    target[i] = areas_[i] * rows.measured_row_sum(i);
     if (rows.counted[i] == 0) continue;
-    const double arrived = [&] {
-      std::uint64_t count = 0;
-      for (std::uint64_t k = rows.first[i]; k < rows.first[i + 1]; ++k) count += rows.entries[k].count;
-      return static_cast<double>(count);
-    }();
+    double arrived = 0;
+    for (std::uint64_t k = rows.first[i]; k < rows.first[i + 1]; ++k) arrived += rows.entries[k].weight;
     const double closure = (arrived + rows.escaped[i] + rows.absorbed[i]) / rows.counted[i];
     repair_.raw_closure_max = std::max(repair_.raw_closure_max, std::fabs(closure - 1));
     area += areas_[i];

@@ -2,12 +2,12 @@
 
 #include <memory>
 
+#include "server/radiosity/transport/estimated_rows.h"
 #include "server/radiosity/transport/operator.h"
-#include "server/radiosity/transport/sampled_rows.h"
 
 namespace radbake::radiosity {
 
-/// What the sampled rows were like and what their repair did. Field for field TransportSummary of the report.
+/// What the estimated rows were like and what their repair did. Field for field TransportSummary of the report.
 struct TransportRepair {
   std::uint64_t num_entries = 0;
   double raw_reciprocity_rms = 0;
@@ -19,12 +19,12 @@ struct TransportRepair {
   double absorbed_share = 0;
 };
 
-/// Sampled rows as one reciprocal matrix in compressed rows.
+/// Estimated rows as one reciprocal matrix in compressed rows.
 ///
 /// A_i F_ij and A_j F_ji are two estimates of one number, S_ij, with variances A_i S_ij / N_i and A_j S_ij / N_j.
 /// Their average with inverse variances as weights is
 ///
-///   S_ij = (c_ij + c_ji) / (N_i / A_i + N_j / A_j)          c: rays that arrived, N: rays of the row
+///   S_ij = (w_ij + w_ji) / (N_i / A_i + N_j / A_j)          w: rays that arrived, N: rays of the row
 ///
 /// A symmetric scaling F_ij = d_i S_ij d_j / A_i then restores the measured row sums r_i = 1 - (escaped +
 /// absorbed)/N_i: exactly where such a scaling exists (closed scenes), else as near as its fixed point comes. Cost:
@@ -32,7 +32,7 @@ struct TransportRepair {
 /// van Leersum 1989 (why row sums and reciprocity both matter).
 class SparseOperator final : public TransportOperator {
  public:
-  explicit SparseOperator(const SampledRows& rows);
+  explicit SparseOperator(const EstimatedRows& rows);
 
   const TransportRepair& repair() const { return repair_; }
 
@@ -53,8 +53,8 @@ class SparseOperator final : public TransportOperator {
   std::span<const double> areas() const override { return areas_; }
 
  private:
-  void pair_estimates(const SampledRows& rows);
-  void restore_row_sums(const SampledRows& rows);
+  void pair_estimates(const EstimatedRows& rows);
+  void restore_row_sums(const EstimatedRows& rows);
   double scaled_row(std::uint32_t i) const;
 
   std::vector<std::uint64_t> first_;

@@ -19,7 +19,7 @@ TEST(ProtoJson, KeepsTheOrderAndTheNamesOfTheFields) {
   solver.set_residual(0.5);
   EXPECT_EQ(to_line(to_json(solver)),
             R"({"solver":"gauss-seidel","status":"converged","sweeps":12,"residual":0.5,"error_bound":0.0,)"
-            R"("relative_error_bound":0.0,"tolerance":0.0})");
+            R"("relative_error_bound":0.0,"tolerance":0.0,"history":[]})");
 }
 
 TEST(ProtoJson, WritesLargeIntegersAsNumbers) {

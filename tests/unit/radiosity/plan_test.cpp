@@ -27,5 +27,67 @@ TEST(PatchEdge, IsFourTexelsWithinTheBoundsOnTheNumberOfPatches) {
   EXPECT_DOUBLE_EQ(patch_edge(0.1, 1, 100), 0.1);
 }
 
+TEST(TransportChoice, TakesTheFastestThatFitsTheMemory) {
+  constexpr std::uint64_t kGigabyte = std::uint64_t{1} << 30;
+  // Full rows are smaller written out; rows with few entries are not.
+  EXPECT_EQ(choose_transport(400, 400, kGigabyte), Transport::kDense);
+  EXPECT_EQ(choose_transport(400, 200, kGigabyte), Transport::kDense);
+  EXPECT_EQ(choose_transport(16384, 256, kGigabyte), Transport::kSparse);
+  // 16384 rows of 256 rays take at most 128 MiB.
+  EXPECT_EQ(transport_bytes(Transport::kSparse, 16384, 256), std::uint64_t{16384} * 32 * 256);
+  EXPECT_EQ(choose_transport(16384, 256, std::uint64_t{16384} * 32 * 256), Transport::kSparse);
+  EXPECT_EQ(choose_transport(16384, 256, std::uint64_t{16384} * 32 * 256 - 1), Transport::kStreamed);
+  EXPECT_EQ(choose_transport(400, 400, 1024), Transport::kStreamed);
+}
+
+/// A plan of so many patches, as far as methods are chosen by it.
+BakePlan plan_of(std::uint64_t num_patches, double max_reflectance) {
+  BakePlan plan;
+  plan.num_patches = num_patches;
+  plan.rays_per_row = 256;
+  plan.survey.max_reflectance = max_reflectance;
+  return plan;
+}
+
+TEST(BakePlan, ChoosesMethodsThatSuitTheScene) {
+  BakePlan plan = plan_of(5000, 0.8);
+  choose_methods({}, plan);
+  EXPECT_EQ(plan.form_factors, FormFactors::kHemisphere);
+  EXPECT_EQ(plan.transport, Transport::kSparse);
+  EXPECT_EQ(plan.solver, Solver::kGaussSeidel);
+  EXPECT_EQ(plan.transport_bytes, std::uint64_t{5000} * 32 * 256);
+  EXPECT_EQ(plan.transport_bytes_limit, kDefaultTransportMemory);
+
+  plan = plan_of(5000, 0.96);
+  choose_methods({}, plan);
+  EXPECT_EQ(plan.solver, Solver::kKrylov);
+
+  // A sweep that traces every row again is dear at any reflectance.
+  plan = plan_of(5000, 0.5);
+  choose_methods({.transport_memory = 1 << 20}, plan);
+  EXPECT_EQ(plan.transport, Transport::kStreamed);
+  EXPECT_EQ(plan.solver, Solver::kKrylov);
+}
+
+TEST(BakePlan, LeavesToTheUserWhatIsAskedByName) {
+  BakePlan plan = plan_of(5000, 0.99);
+  choose_methods({.form_factors = FormFactors::kAnalytic,
+                  .transport = Transport::kDense,
+                  .solver = Solver::kLu,
+                  .transport_memory = 1 << 20},
+                 plan);
+  EXPECT_EQ(plan.form_factors, FormFactors::kAnalytic);
+  EXPECT_EQ(plan.transport, Transport::kDense);
+  EXPECT_EQ(plan.solver, Solver::kLu);
+  EXPECT_GT(plan.transport_bytes, plan.transport_bytes_limit);
+}
+
+TEST(BakePlan, AllowsTheSweepsThatAHighReflectanceNeeds) {
+  // rho^k (1 - rho)^-1 = 1e-6 at rho 0.9999: k = 230 000, and as many again.
+  EXPECT_NEAR(max_sweeps_of(0.9999, 1e-6), 2 * 230'000, 10'000);
+  EXPECT_EQ(max_sweeps_of(0.5, 1e-6), SolveOptions{}.max_sweeps);
+  EXPECT_EQ(max_sweeps_of(0, 1e-6), SolveOptions{}.max_sweeps);
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

@@ -12,9 +12,9 @@ namespace radbake::radiosity {
 namespace {
 
 /// Rows of n patches that see a third of each other, with rays that escape; the last patch is buried: no rays, no area.
-SampledRows sampled_rows(std::uint32_t n, std::uint64_t seed) {
+EstimatedRows sampled_rows(std::uint32_t n, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  SampledRows rows;
+  EstimatedRows rows;
   rows.first.push_back(0);
   for (std::uint32_t i = 0; i < n; ++i) {
     std::uint32_t counted = 0;
@@ -22,7 +22,7 @@ SampledRows sampled_rows(std::uint32_t n, std::uint64_t seed) {
       if (j == i || (i * 7 + j * 7) % 3 != 0) continue;
       const auto count = static_cast<std::uint32_t>(random() % 20);
       if (count == 0) continue;
-      rows.entries.push_back({j, count});
+      rows.entries.push_back({j, static_cast<float>(count)});
       counted += count;
     }
     const auto escaped = counted > 0 ? static_cast<std::uint32_t>(random() % 10) : 0;

@@ -12,14 +12,14 @@ namespace {
 
 /// Rows of n patches of random areas that see each other at random: exchange areas S_ij, counts sampled from S_ij /
 /// A_i.
-SampledRows random_rows(int n, double escape, unsigned seed) {
+EstimatedRows random_rows(int n, double escape, unsigned seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> any(0.1, 1);
   std::vector<std::vector<double>> exchange(n, std::vector<double>(n, 0));
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < i; ++j) exchange[i][j] = exchange[j][i] = any(random);
   }
-  SampledRows rows;
+  EstimatedRows rows;
   rows.first.push_back(0);
   for (int i = 0; i < n; ++i) {
     double sum = 0;
@@ -35,7 +35,7 @@ SampledRows random_rows(int n, double escape, unsigned seed) {
         ++counts[static_cast<std::uint32_t>(target(random))];
       }
     }
-    for (const auto& [patch, count] : counts) rows.entries.push_back({patch, count});
+    for (const auto& [patch, count] : counts) rows.entries.push_back({patch, static_cast<float>(count)});
     rows.first.push_back(rows.entries.size());
     rows.counted.push_back(kRays);
     rows.escaped.push_back(escaped);
@@ -57,7 +57,7 @@ constexpr double kRounding = 1e-12;
 
 TEST(SparseOperator, IsReciprocalAndRestoresTheMeasuredRowSums) {
   for (const double escape : {0.0, 0.3}) {
-    const SampledRows rows = random_rows(40, escape, 11);
+    const EstimatedRows rows = random_rows(40, escape, 11);
     const SparseOperator transport(rows);
     EXPECT_GT(transport.repair().raw_reciprocity_rms, 0.1);  // raw estimates differ
     EXPECT_EQ(transport.repair().raw_closure_max, 0);
@@ -85,7 +85,7 @@ TEST(SparseOperator, GathersWithItsRows) {
 
 TEST(SparseOperator, SaysWhereNoScalingFits) {
   // Two patches that see only each other, with row sums that cannot both hold: A_1 r_1 = 0.8, A_2 r_2 = 0.6.
-  SampledRows rows;
+  EstimatedRows rows;
   rows.first = {0, 1, 2};
   rows.entries = {{1, 80}, {0, 60}};
   rows.counted = {100, 100};
@@ -98,7 +98,7 @@ TEST(SparseOperator, SaysWhereNoScalingFits) {
 }
 
 TEST(SparseOperator, LeavesPatchesWithoutRowsEmpty) {
-  SampledRows rows;
+  EstimatedRows rows;
   rows.first = {0, 1, 2, 2};
   rows.entries = {{1, 10}, {0, 10}};
   rows.counted = {10, 10, 0};

@@ -21,7 +21,6 @@ BakePlan fake_plan(const Scene& scene) {
   plan.survey.num_meshes = scene.meshes.size();
   plan.survey.num_triangles = scene.meshes.at(0).triangles.size();
   plan.atlas_size = kFakeAtlasSize;
-  plan.solver = "gauss-seidel";
   return plan;
 }
 

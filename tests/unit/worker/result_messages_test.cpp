@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "server/settings/to_options.h"
 #include "server/worker/status_message.h"
 
 namespace radbake::worker {
@@ -52,9 +53,11 @@ radiosity::BakePlan full_plan() {
   plan.rays_per_texel = 17;
   plan.rays_per_row = 18;
   plan.light_samples_per_texel = 19;
-  plan.estimator = "hemisphere";
-  plan.transport = "sparse";
-  plan.solver = "gauss-seidel";
+  plan.form_factors = radiosity::FormFactors::kAdaptive;
+  plan.transport = radiosity::Transport::kStreamed;
+  plan.solver = radiosity::Solver::kShooting;
+  plan.transport_bytes = 24;
+  plan.transport_bytes_limit = 25;
   plan.texels_per_meter = 20.5;
   plan.atlas_height = 21;
   plan.num_lightmaps = 22;
@@ -72,6 +75,9 @@ TEST(ResultMessages, SetEveryFieldOfAPlan) {
   EXPECT_EQ(plan.rays_per_row(), 18U);
   EXPECT_EQ(plan.light_samples_per_texel(), 19U);
   EXPECT_EQ(plan.warnings(0).id(), "plan_warning");
+  EXPECT_EQ(plan.estimator(), "adaptive");
+  EXPECT_EQ(plan.transport(), "streamed");
+  EXPECT_EQ(plan.solver(), "shooting");
 }
 
 TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
@@ -82,9 +88,9 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   report.num_row_rays = 22;
   report.num_gather_rays = 23;
   report.num_light_rays = 24;
-  report.solver = {"gauss-seidel", "converged", 25, 26.5, 27.5, 28.5, 29.5};
+  report.solver = {"gauss-seidel", "converged", 25, 26.5, 27.5, 28.5, 29.5, {{1, 2, 3.5, 4.5}}};
   report.energy = {true, 30.5, 31.5, 32.5, 33.5, 34.5, 35.5, 36.5};
-  report.transport = {37, 38.5, 39.5, 40.5, 41.5, 42, 43.5, 44.5};
+  report.transport = {37, 38.5, 39.5, 40.5, 41.5, 42, 43.5, 44.5, 45.5, 46};
   report.lightmap = {45, 46, 47, 48, 49.5, 50, 51, 52.5, 53, 54, 55, 56, 57.5, 58, 59.5, 60.5};
   report.vertices = {61, 62, 63};
   report.warnings = {{"bake_warning", "of the bake"}};
@@ -93,6 +99,8 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   EXPECT_EQ(message.num_light_rays(), 24U);
   EXPECT_EQ(message.solver().sweeps(), 25U);
   EXPECT_EQ(message.solver().tolerance(), 29.5);
+  EXPECT_EQ(message.solver().history(0).rows(), 2U);
+  EXPECT_EQ(message.solver().history(0).relative_error_bound(), 4.5);
   EXPECT_EQ(message.energy().emitted(), 30.5);
   EXPECT_EQ(message.energy().mean_irradiance(), 36.5);
   EXPECT_EQ(message.transport().num_entries(), 37U);
@@ -159,9 +167,13 @@ TEST(ResultMessages, ReadEverySetting) {
   settings.set_seed(0xffffffffffffffff);
   settings.set_lightmap_uv(v1::LIGHTMAP_UV_UNWRAP);
   settings.set_output(v1::OUTPUT_BOTH);
+  settings.set_form_factors(v1::FORM_FACTORS_HEMICUBE);
+  settings.set_transport(v1::TRANSPORT_DENSE);
+  settings.set_solver(v1::SOLVER_LU);
+  settings.set_transport_memory_bytes(4096);
   v1::RunOptions run;
   run.set_threads(3);
-  const radiosity::BakeOptions options = to_options(settings, run);
+  const radiosity::BakeOptions options = settings::to_options(settings, run);
   EXPECT_EQ(options.atlas_size, 256);
   EXPECT_EQ(options.texels_per_meter, 16.5);
   EXPECT_EQ(options.rays, 512);
@@ -169,7 +181,40 @@ TEST(ResultMessages, ReadEverySetting) {
   EXPECT_EQ(options.seed, 0xffffffffffffffff);
   EXPECT_EQ(options.lightmap_uv, radiosity::LightmapUv::kUnwrap);
   EXPECT_EQ(options.output, radiosity::Output::kBoth);
+  EXPECT_EQ(options.form_factors, radiosity::FormFactors::kHemicube);
+  EXPECT_EQ(options.transport, radiosity::Transport::kDense);
+  EXPECT_EQ(options.solver, radiosity::Solver::kLu);
+  EXPECT_EQ(options.transport_memory, 4096u);
   EXPECT_EQ(options.threads, 3);
+}
+
+/// The words of the wire are those of the library: what is chosen by name on one side has that name on the other.
+TEST(ResultMessages, ReadEveryMethodAsTheOneOfItsName) {
+  const auto lower = [](std::string name, const std::string& prefix) {
+    name.erase(0, prefix.size());
+    for (char& c : name) c = c == '_' ? '-' : static_cast<char>(std::tolower(c));
+    return name;
+  };
+  for (int value = 0; value <= v1::FormFactors_MAX; ++value) {
+    v1::BakeSettings settings;
+    settings.set_form_factors(static_cast<v1::FormFactors>(value));
+    EXPECT_EQ(radiosity::form_factors_name(settings::to_options(settings, {}).form_factors),
+              lower(v1::FormFactors_Name(settings.form_factors()), "FORM_FACTORS_"));
+  }
+  for (int value = 0; value <= v1::Transport_MAX; ++value) {
+    v1::BakeSettings settings;
+    settings.set_transport(static_cast<v1::Transport>(value));
+    EXPECT_EQ(radiosity::transport_name(settings::to_options(settings, {}).transport),
+              lower(v1::Transport_Name(settings.transport()), "TRANSPORT_"));
+  }
+  EXPECT_FALSE(settings::to_options({}, {}).solver.has_value());
+  for (int value = 1; value <= v1::Solver_MAX; ++value) {
+    v1::BakeSettings settings;
+    settings.set_solver(static_cast<v1::Solver>(value));
+    const auto solver = settings::to_options(settings, {}).solver;
+    ASSERT_TRUE(solver.has_value());
+    EXPECT_EQ(radiosity::solver_name(*solver), lower(v1::Solver_Name(settings.solver()), "SOLVER_"));
+  }
 }
 
 TEST(StatusMessage, HasTheCodeOfTheSameName) {

@@ -1,9 +1,9 @@
-#include "client/cli/values.h"
+#include "client/options/values.h"
 
 #include <charconv>
 #include <cmath>
 
-namespace radbake::cli {
+namespace radbake::options {
 namespace {
 
 /// Three finite numbers with commas between them; `what` says what was expected.
@@ -45,4 +45,20 @@ Result<DirectionalLight> parse_sun(const std::string& text) {
   return DirectionalLight{normalized(direction / scale), illuminance};
 }
 
-}  // namespace radbake::cli
+Result<std::uint64_t> parse_bytes(const std::string& text) {
+  const Error bad = invalid_argument("'" + text + "' is not a number of bytes from 1K to 1024G, such as 512M or 4G");
+  std::uint64_t value = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, failure] = std::from_chars(text.data(), last, value);
+  if (failure != std::errc() || last - end > 1) return bad;
+  const std::string suffixes = "KMG";
+  const std::size_t step = end == last ? 0 : suffixes.find(*end) + 1;
+  if (end != last && step == 0) return bad;
+  constexpr std::uint64_t kLeast = std::uint64_t{1} << 10, kMost = std::uint64_t{1} << 40;
+  if (value > kMost >> (10 * step)) return bad;
+  value <<= 10 * step;
+  if (value < kLeast) return bad;
+  return value;
+}
+
+}  // namespace radbake::options

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "common/base/result.h"
 #include "common/geometry/vector.h"
 #include "common/scene/scene.h"
 
-namespace radbake::cli {
+namespace radbake::options {
 
 /// "R,G,B": three finite numbers >= 0.
 /// Errors: kInvalidArgument names the number.
@@ -16,4 +17,8 @@ Result<Vec3> parse_rgb(const std::string& text);
 /// Errors: kInvalidArgument names the number.
 Result<DirectionalLight> parse_sun(const std::string& text);
 
-}  // namespace radbake::cli
+/// "N", "NK", "NM" or "NG": bytes, 1024 a step; at least 1K.
+/// Errors: kInvalidArgument names the value.
+Result<std::uint64_t> parse_bytes(const std::string& text);
+
+}  // namespace radbake::options

@@ -1,8 +1,8 @@
-#include "client/cli/scene_light.h"
+#include "client/options/scene_light.h"
 
 #include <algorithm>
 
-namespace radbake::cli {
+namespace radbake::options {
 namespace {
 
 bool emits(const Material& material, const Scene& scene) {
@@ -54,4 +54,4 @@ Result<void> require_light(const Scene& scene, const std::string& scene_name) {
       "(KHR_lights_punctual)");
 }
 
-}  // namespace radbake::cli
+}  // namespace radbake::options

@@ -5,7 +5,7 @@
 #include "common/base/result.h"
 #include "common/scene/scene.h"
 
-namespace radbake::cli {
+namespace radbake::options {
 
 /// Adds the command line's sky and sun to a scene.
 void add_sky_and_sun(const std::optional<Vec3>& sky, const std::optional<DirectionalLight>& sun, Scene& scene);
@@ -16,4 +16,4 @@ bool has_light(const Scene& scene);
 /// Refuses a scene that would bake to black. Errors: kInvalidArgument says how to add a light.
 Result<void> require_light(const Scene& scene, const std::string& scene_name);
 
-}  // namespace radbake::cli
+}  // namespace radbake::options

@@ -1,9 +1,9 @@
-#include "client/cli/scene_light.h"
+#include "client/options/scene_light.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace radbake::cli {
+namespace radbake::options {
 namespace {
 
 using testing::AllOf;
@@ -67,4 +67,4 @@ TEST(SceneLight, AddsTheSkyAndTheSunOfTheCommandLine) {
 }
 
 }  // namespace
-}  // namespace radbake::cli
+}  // namespace radbake::options

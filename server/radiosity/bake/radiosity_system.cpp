@@ -1,0 +1,156 @@
+#include "server/radiosity/bake/radiosity_system.h"
+
+#include <algorithm>
+#include <numbers>
+
+#include "server/radiosity/form_factor/hemicube_rows.h"
+#include "server/radiosity/form_factor/hemisphere_rows.h"
+#include "server/radiosity/transport/dense_operator.h"
+#include "server/radiosity/transport/sparse_operator.h"
+#include "server/radiosity/transport/streamed_operator.h"
+
+namespace radbake::radiosity {
+namespace {
+
+std::unique_ptr<RowEstimator> make_estimator(const Preparation& prepared) {
+  const Surfaces& surfaces = prepared.surveyed.surfaces;
+  const Visibility& visibility = *prepared.visibility;
+  if (prepared.plan.form_factors == FormFactors::kHemicube) {
+    return std::make_unique<HemicubeEstimator>(surfaces, prepared.patches, visibility);
+  }
+  return std::make_unique<HemisphereRows>(surfaces, prepared.patches, visibility, prepared.plan.rays_per_row);
+}
+
+struct TakenRow {
+  FormFactorRow row;  ///< without entries where they are not kept
+  PatchSample sample;
+  std::uint32_t length = 0;
+};
+
+/// The light on each patch and what it does with it.
+void fill_light(const std::vector<TakenRow>& rows, Vec3 sky, RadiositySystem& system) {
+  for (const auto& [row, sample, length] : rows) {
+    // The sky's part: what of the row escaped sees it.
+    const Vec3 from_sky = row.counted > 0 ? sky * (std::numbers::pi * row.escaped / row.counted) : Vec3{};
+    const Vec3 direct = sample.direct + from_sky;
+    system.problem.source.push_back(sample.glow + scaled_by(sample.reflectance, direct));
+    system.problem.reflectance.push_back(sample.reflectance);
+    system.glow.push_back(sample.glow);
+    system.direct.push_back(direct);
+    system.direct_variances.push_back(sample.direct_variance);
+    system.num_row_rays += row.traced;
+    system.num_light_rays += sample.light_rays;
+    system.summary.row_error_max = std::max(system.summary.row_error_max, row.stated_error);
+    system.summary.num_rows_clipped += row.clipped > 0;
+  }
+}
+
+/// All rows in one piece, areas in square metres. Takes the entries.
+EstimatedRows collected(const Patches& patches, double square_metres, std::vector<TakenRow>& rows) {
+  EstimatedRows all;
+  std::size_t num_entries = 0;
+  for (const TakenRow& taken : rows) num_entries += taken.row.entries.size();
+  all.entries.reserve(num_entries);
+  all.first.assign(1, 0);
+  for (std::uint32_t i = 0; i < rows.size(); ++i) {
+    FormFactorRow& row = rows[i].row;
+    for (const FormFactorRow::Entry& entry : row.entries) all.entries.push_back({entry.patch, entry.weight});
+    all.first.push_back(all.entries.size());
+    all.counted.push_back(row.counted);
+    all.escaped.push_back(row.escaped);
+    all.absorbed.push_back(row.absorbed);
+    all.areas.push_back(row.counted > 0 ? patches.area(i) * rows[i].sample.visible_share * square_metres : 0);
+    row.entries = {};
+  }
+  return all;
+}
+
+void summarise(const TransportRepair& repair, TransportSummary& summary) {
+  summary.num_entries = repair.num_entries;
+  summary.raw_reciprocity_rms = repair.raw_reciprocity_rms;
+  summary.raw_closure_max = repair.raw_closure_max;
+  summary.paired_row_error_rms = repair.paired_row_error_rms;
+  summary.repaired_row_error_max = repair.repaired_row_error_max;
+  summary.scaling_sweeps = repair.scaling_sweeps;
+  summary.escape_share = repair.escape_share;
+  summary.absorbed_share = repair.absorbed_share;
+}
+
+/// The operator that keeps no entries: `rows` holds the sums of each, the system's sampler makes them again.
+std::unique_ptr<TransportOperator> make_streamed(const EstimatedRows& rows, const std::vector<TakenRow>& taken,
+                                                 Solver solver, RadiositySystem& system, std::stop_token stop) {
+  RowSums sums;
+  double area = 0, escaped = 0, absorbed = 0;
+  for (std::uint32_t i = 0; i < rows.size(); ++i) {
+    sums.measured.push_back(rows.measured_row_sum(i));
+    sums.lengths.push_back(taken[i].length);
+    system.summary.num_entries += taken[i].length;
+    if (rows.counted[i] == 0) continue;
+    area += rows.areas[i];
+    escaped += rows.areas[i] * rows.escaped[i] / rows.counted[i];
+    absorbed += rows.areas[i] * rows.absorbed[i] / rows.counted[i];
+  }
+  sums.areas = rows.areas;
+  system.summary.escape_share = area > 0 ? escaped / area : 0;
+  system.summary.absorbed_share = area > 0 ? absorbed / area : 0;
+  const RowSource source = [&sampler = *system.sampler, counted = rows.counted, stop](
+                               std::uint32_t patch, std::vector<EstimatedRows::Entry>& entries) {
+    entries.clear();
+    // What no row has reached has none itself.
+    if (counted[patch] == 0 || stop.stop_requested()) return;
+    PatchScratch scratch = sampler.make_scratch();
+    FormFactorRow row;
+    sampler.sample_row(patch, scratch, stop, row);
+    for (const FormFactorRow::Entry& entry : row.entries) entries.push_back({entry.patch, entry.weight});
+  };
+  return std::make_unique<StreamedOperator>(
+      std::move(sums), source, reads_columns(solver) ? StreamedSystem::kByColumns : StreamedSystem::kByRows);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
+    const Preparation& prepared, std::uint64_t seed, Vec3 sky,
+    const std::function<void(std::uint64_t, std::uint64_t)>& on_row, std::stop_token stop) {
+  const Surfaces& surfaces = prepared.surveyed.surfaces;
+  const Patches& patches = prepared.patches;
+  auto system = std::make_unique<RadiositySystem>();
+  system->estimator = make_estimator(prepared);
+  system->direct_light = std::make_unique<DirectLight>(surfaces, *prepared.visibility, kLightSamplesPerPatch);
+  system->sampler = std::make_unique<PatchSampler>(surfaces, patches, *system->estimator, *system->direct_light, seed);
+  system->emitted_lumens = system->direct_light->emitted_lumens();
+
+  // Estimate the rows, and the light on each patch.
+  const bool is_streamed = prepared.plan.transport == Transport::kStreamed;
+  std::vector<TakenRow> rows(patches.size());
+  sample_patches(
+      *system->sampler, patches.num_cells(),
+      [&](std::uint32_t patch, FormFactorRow& row, const PatchSample& sample) {
+        rows[patch].length = static_cast<std::uint32_t>(row.entries.size());
+        if (is_streamed) row.entries.clear();
+        rows[patch].row = row;  // a copy is no longer than it need be
+        rows[patch].sample = sample;
+      },
+      on_row, stop);
+  if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
+  fill_light(rows, sky, *system);
+
+  // Put the operator together.
+  EstimatedRows estimated = collected(patches, surfaces.metres_per_unit * surfaces.metres_per_unit, rows);
+  if (is_streamed) {
+    system->transport = make_streamed(estimated, rows, prepared.plan.solver, *system, stop);
+    return system;
+  }
+  rows = {};
+  auto sparse = std::make_unique<SparseOperator>(estimated);
+  estimated = {};
+  summarise(sparse->repair(), system->summary);
+  if (prepared.plan.transport == Transport::kDense) {
+    system->transport = std::make_unique<DenseOperator>(*sparse);
+  } else {
+    system->transport = std::move(sparse);
+  }
+  return system;
+}
+
+}  // namespace radbake::radiosity

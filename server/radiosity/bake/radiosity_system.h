@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "common/base/result.h"
+#include "server/radiosity/bake/bake.h"
+#include "server/radiosity/bake/preparation.h"
+#include "server/radiosity/form_factor/patch_rows.h"
+#include "server/radiosity/solve/solve.h"
+#include "server/radiosity/transport/operator.h"
+
+namespace radbake::radiosity {
+
+/// The system B' = source + rho F B' of a scene, as its plan says: form factors, how they are kept, and the light on
+/// each patch. The scene's preparation outlives it.
+struct RadiositySystem {
+  std::unique_ptr<TransportOperator> transport;
+  RadiosityProblem problem;
+  std::vector<Vec3> glow, direct;        ///< [patches] E_in; H^direct with what the sky sends, lx
+  std::vector<double> direct_variances;  ///< [patches]
+  double emitted_lumens = 0;             ///< of the emitters, mean of the channels
+  TransportSummary summary;
+  std::uint64_t num_row_rays = 0, num_light_rays = 0;
+
+  /// What a streamed operator goes on using.
+  std::unique_ptr<RowEstimator> estimator;
+  std::unique_ptr<DirectLight> direct_light;
+  std::unique_ptr<PatchSampler> sampler;
+};
+
+/// Estimates the rows of a prepared scene and puts the operator together.
+///
+/// on_row as in sample_patches(). A streamed operator stops estimating when `stop` is requested, later on too.
+/// Errors: kCancelled.
+Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
+    const Preparation& prepared, std::uint64_t seed, Vec3 sky,
+    const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row, std::stop_token stop);
+
+}  // namespace radbake::radiosity

@@ -1,6 +1,7 @@
 // radbake-study: what the numeric library's methods cost and how exact they are.
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -9,12 +10,13 @@
 #include "server/study/cases.h"
 #include "server/study/enclosure_study.h"
 #include "server/study/form_factor_study.h"
+#include "server/study/rates_study.h"
 
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kDone = 0, kUsage = 2, kBadInput = 3;
+constexpr int kDone = 0, kNotWritten = 1, kUsage = 2, kBadInput = 3;
 
 struct Choices {
   std::string cases;
@@ -23,21 +25,41 @@ struct Choices {
   std::string estimator;  ///< of form factors
 };
 
+/// Prints what is wrong. Returns the exit code.
+int fail(const radbake::Error& error, int code) {
+  std::cerr << "radbake-study: error: " << error.message << '\n';
+  return code;
+}
+
 /// Reads the cases, studies them, prints the table and writes the JSON.
 int run(const Choices& choices, const std::function<Json(const Json&, double)>& study,
         const std::function<std::string(const Json&)>& table) {
   const auto cases = radbake::study::read_cases(choices.cases);
-  if (!cases.ok()) {
-    std::cerr << "radbake-study: error: " << cases.error().message << '\n';
-    return kBadInput;
-  }
+  if (!cases.ok()) return fail(cases.error(), kBadInput);
   const Json result = study(*cases, choices.tolerance);
   std::cout << table(result);
   if (choices.json.empty()) return kDone;
   const auto written = radbake::study::write_text(choices.json, result.dump(2) + "\n");
-  if (written.ok()) return kDone;
-  std::cerr << "radbake-study: error: " << written.error().message << '\n';
-  return 1;
+  return written.ok() ? kDone : fail(written.error(), kNotWritten);
+}
+
+/// Makes a folder where there is none, and writes a table and a plot of it there.
+radbake::Result<void> write_study(const std::string& folder, const std::string& name, const std::string& csv,
+                                  const radbake::study::Plot& plot) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure) return radbake::internal_error("cannot make the folder " + folder + ": " + failure.message());
+  RADBAKE_RETURN_IF_ERROR(radbake::study::write_text(std::filesystem::path(folder) / (name + ".csv"), csv));
+  return radbake::study::draw(plot, folder, name);
+}
+
+int run_rates(const std::string& path, const std::string& folder) {
+  const auto cases = radbake::study::read_cases(path);
+  if (!cases.ok()) return fail(cases.error(), kBadInput);
+  const auto study = radbake::study::study_rates(*cases, {});
+  std::cout << radbake::study::rate_table(study);
+  const auto written = write_study(folder, "rates", radbake::study::rate_csv(study), radbake::study::rate_plot(study));
+  return written.ok() ? kDone : fail(written.error(), kNotWritten);
 }
 
 }  // namespace
@@ -80,6 +102,16 @@ int main(int argc, char** argv) {
   solve->add_option("--json", enclosures.json, "Also write the results to this file");
   solve->footer("\nExample:\n  radbake-study enclosures tests/reference/radiosity_cases.json --json solved.json\n");
 
+  std::string rate_cases, rate_folder;
+  CLI::App* rates = app.add_subcommand("rates", "How the errors of rays and hemicubes fall with their number");
+  rates->add_option("CASES", rate_cases, "List of cases: polygons, from, to, occluders")->required();
+  rates
+      ->add_option("-o,--out", rate_folder,
+                   "Folder for rates.csv, rates.svg and rates.png; is made where there is none")
+      ->required()
+      ->type_name("DIR");
+  rates->footer("\nExample:\n  radbake-study rates tests/reference/form_factor_cases.json -o rates\n");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -92,5 +124,6 @@ int main(int argc, char** argv) {
     };
     return run(form_factors, study, radbake::study::form_factor_table);
   }
+  if (rates->parsed()) return run_rates(rate_cases, rate_folder);
   return run(enclosures, radbake::study::study_enclosures, radbake::study::enclosure_table);
 }

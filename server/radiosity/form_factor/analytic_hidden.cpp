@@ -8,7 +8,6 @@ namespace radbake::radiosity {
 namespace {
 
 constexpr int kMostChains = 256;
-constexpr long kMostEvaluationsOfChain = 100'000;
 // How much polygons shrink for general position: a part in 4e9, but at least so much that rounding stays a small part
 // of it. Each by its own multiple, by the golden ratio: equal steps would leave what lies in one plane in one plane.
 constexpr double kShrinkage = 0x1p-32, kShrinkageOverRounding = 0x1p-46;
@@ -22,7 +21,8 @@ double shrinkage_of(const PolygonCorners& corners, std::size_t place) {
 /// Walks over the chains of occluders that lines pass one after the other.
 class Chains {
  public:
-  Chains(std::span<const Passing> passings, double tolerance) : passings_(passings), tolerance_(tolerance) {}
+  Chains(std::span<const Passing> passings, double tolerance, long most)
+      : passings_(passings), tolerance_(tolerance), most_(most) {}
 
   Exchange add_up() {
     for (std::uint32_t k = 0; k < passings_.size(); ++k) extend({}, k);
@@ -102,21 +102,22 @@ class Chains {
       const double distance = share * radius_about(mean_corner(corners), corners);
       moved += std::min(movement_error(corners, distance, p), movement_error(corners, distance, q));
     }
-    Exchange exchange =
-        crossing_exchange(polygons, tolerance_ / static_cast<double>(chains_.size()), kMostEvaluationsOfChain);
+    Exchange exchange = crossing_exchange(polygons, tolerance_ / static_cast<double>(chains_.size()),
+                                          most_ / static_cast<long>(chains_.size()));
     exchange.error += moved;
     return exchange;
   }
 
   std::span<const Passing> passings_;
   double tolerance_;
+  long most_;
   std::vector<Chain> chains_;
 };
 
 }  // namespace
 
-Exchange hidden_exchange(std::span<const Passing> passings, double tolerance) {
-  return Chains(passings, tolerance).add_up();
+Exchange hidden_exchange(std::span<const Passing> passings, double tolerance, long most) {
+  return Chains(passings, tolerance, most).add_up();
 }
 
 }  // namespace radbake::radiosity

@@ -9,7 +9,8 @@ namespace radbake::radiosity {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr long kMostEvaluations = 4'000'000;
+// Of the lines between edges, before what is visible is integrated: these cost little.
+constexpr long kMostHiddenEvaluations = 400'000;
 // What the contour must state, relative to the smaller area and to its value, or the area is integrated too: a tenth of
 // what is promised.
 constexpr double kContourError = 1e-10, kContourRelativeError = 1e-9;
@@ -52,7 +53,8 @@ PairExchange unoccluded_exchange(const Piece& p, const Piece& q) {
   // The sum cancels: integrate over the smaller patch, where no term does.
   const bool p_is_smaller = polygon_area(p.corners) < polygon_area(q.corners);
   const double tolerance = std::max(std::min(kUnoccludedError * area, contour.error / 2), kEpsilon * area);
-  Exchange smooth = visible_exchange(p_is_smaller ? p : q, p_is_smaller ? q : p, {}, tolerance, kMostEvaluations / 20);
+  Exchange smooth =
+      visible_exchange(p_is_smaller ? p : q, p_is_smaller ? q : p, {}, tolerance, kMostPairEvaluations / 20);
   if (smooth.error >= contour.error) return {contour, AnalyticMethod::kContour};
   smooth.evaluations += contour.evaluations;
   return {smooth, AnalyticMethod::kQuadrature};
@@ -89,7 +91,12 @@ class PassingFinder {
 
   /// Whether bodies hold parts of the patches: then their faces cannot be counted one by one.
   bool is_tangled() const { return is_tangled_; }
-  std::vector<Passing>& passings() { return passings_; }
+  /// Whether one patch is in a body and the other out of it, or one occluder hides all.
+  bool hides_all() const {
+    return is_walled_off_ ||
+           std::any_of(passings_.begin(), passings_.end(), [](const Passing& passing) { return passing.hides_all; });
+  }
+  std::span<const Passing> passings() const { return passings_; }
 
   /// Returns whether the occluder reaches the lines between p and q.
   bool find(std::uint32_t k) {
@@ -111,9 +118,10 @@ class PassingFinder {
     // Lines that start outside of a body are counted where they enter it, others where they leave it.
     const std::uint32_t body = occluders_.body_of(k);
     if (body != kNoBody) {
-      const Place place = place_of_p(body);
-      is_tangled_ = is_tangled_ || place == Place::kAcross;
-      const bool counts_entries = place == Place::kOutside;
+      const auto [place_p, place_q] = places_of_patches(body);
+      is_tangled_ = is_tangled_ || place_p == Place::kAcross || place_q == Place::kAcross;
+      is_walled_off_ = is_walled_off_ || (place_p != place_q && !is_tangled_);
+      const bool counts_entries = place_p == Place::kOutside;
       std::erase_if(passings_, [&](const Passing& passing) {
         return passing.occluder == k && (passing.ahead.normal == occluder.front.normal) == counts_entries;
       });
@@ -141,24 +149,29 @@ class PassingFinder {
     passings_.push_back(std::move(passing));
   }
 
-  Place place_of_p(std::uint32_t body) {
-    for (const auto& [known, place] : places_) {
-      if (known == body) return place;
+  std::pair<Place, Place> places_of_patches(std::uint32_t body) {
+    for (const Places& known : places_) {
+      if (known.body == body) return {known.p, known.q};
     }
-    places_.push_back({body, place_of(p_, occluders_, body)});
-    return places_.back().second;
+    places_.push_back({body, place_of(p_, occluders_, body), place_of(q_, occluders_, body)});
+    return {places_.back().p, places_.back().q};
   }
 
+  struct Places {
+    std::uint32_t body;
+    Place p, q;
+  };
   const Piece& p_;
   const Piece& q_;
   const Occluders& occluders_;
   PolygonCorners q_reversed_;
   std::vector<Passing> passings_;
-  std::vector<std::pair<std::uint32_t, Place>> places_;
-  bool is_tangled_ = false;
+  std::vector<Places> places_;
+  bool is_tangled_ = false, is_walled_off_ = false;
 };
 
-Exchange visible_past(const Piece& p, const Piece& q, const std::vector<Piece>& occluders, double tolerance) {
+Exchange visible_past(const Piece& p, const Piece& q, const std::vector<Piece>& occluders, double tolerance,
+                      long most) {
   for (const Piece& occluder : occluders) {
     if (hides_all(occluder, p, q)) return {};
   }
@@ -169,7 +182,7 @@ Exchange visible_past(const Piece& p, const Piece& q, const std::vector<Piece>& 
     from_q = std::min(from_q, distance_between(occluder, q));
   }
   const bool over_p = from_p > from_q || (from_p == from_q && polygon_area(p.corners) <= polygon_area(q.corners));
-  return visible_exchange(over_p ? p : q, over_p ? q : p, occluders, tolerance, kMostEvaluations);
+  return visible_exchange(over_p ? p : q, over_p ? q : p, occluders, tolerance, most);
 }
 
 }  // namespace
@@ -188,7 +201,7 @@ double movement_error(const PolygonCorners& moved, double near, const PolygonCor
 }
 
 PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occluders& occluders,
-                           std::span<const std::uint32_t> candidates, double tolerance) {
+                           std::span<const std::uint32_t> candidates, double tolerance, long most) {
   // Clip each piece to the front of the other.
   const Reach p_reach = reach_of(whole_p.corners, whole_q.front), q_reach = reach_of(whole_q.corners, whole_p.front);
   if (!p_reach.front || !q_reach.front) return {};
@@ -201,9 +214,7 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
   std::vector<std::uint32_t> in_shaft;
   for (const std::uint32_t k : candidates) {
     if (finder.find(k)) in_shaft.push_back(k);
-  }
-  for (const Passing& passing : finder.passings()) {
-    if (passing.hides_all) return {{0, 0, 0}, AnalyticMethod::kOccluded};
+    if (finder.hides_all()) return {{0, 0, 0}, AnalyticMethod::kOccluded};
   }
 
   PairExchange result;
@@ -217,7 +228,7 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
     if (!finder.is_tangled()) {
       // What is open, less what is hidden.
       const PairExchange open = unoccluded_exchange(p, q);
-      const Exchange hidden = hidden_exchange(finder.passings(), tolerance / 2);
+      const Exchange hidden = hidden_exchange(finder.passings(), tolerance / 2, std::min(most, kMostHiddenEvaluations));
       open_value = open.value;
       result.value = open.value - hidden.value;
       result.error = open.error + hidden.error;
@@ -226,7 +237,7 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
     if (!(result.error <= std::min(tolerance, kMostHiddenError * open_value))) {
       std::vector<Piece> pieces;
       for (const std::uint32_t k : in_shaft) pieces.push_back(occluders.pieces()[k]);
-      const Exchange visible = visible_past(p, q, pieces, tolerance);
+      const Exchange visible = visible_past(p, q, pieces, tolerance, most);
       if (visible.error <= std::max(tolerance, result.error)) {
         result = {visible, AnalyticMethod::kOccluded};
         is_difference = false;

@@ -8,6 +8,8 @@
 
 namespace radbake::radiosity {
 
+inline constexpr long kMostPairEvaluations = 4'000'000;
+
 /// A F between two convex pieces, how it was found and how far from exact it may be.
 struct PairExchange : Exchange {
   AnalyticMethod method = AnalyticMethod::kZero;
@@ -20,12 +22,13 @@ struct PairExchange : Exchange {
 /// by pairs of edges (hidden_exchange); where that does not end, the outer integral over what is visible.
 /// The error includes corners known to 8 ulp. A difference that is not above its error is 0.
 ///
-/// Units:  tolerance in those of A F; it bounds the error of occluded pairs.
+/// Units:  tolerance in those of A F; it bounds the error of occluded pairs, unless `most` evaluations end it.
 /// Errors: precondition: the pieces do not coincide face to face; candidates hold every occluder between them.
 /// Occluders
 ///         in the plane of a piece count for nothing here.
 PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occluders& occluders,
-                           std::span<const std::uint32_t> candidates, double tolerance);
+                           std::span<const std::uint32_t> candidates, double tolerance,
+                           long most = kMostPairEvaluations);
 
 /// Light from p to q that passes through one occluder: parts of the pieces on its two sides, and its part between them.
 /// All three counter-clockwise about the lines from p to q.
@@ -41,7 +44,7 @@ struct Passing {
 /// A F of the lines from p to q that pass through any occluder: inclusion and exclusion over the chains of occluders of
 /// different items that lines pass one after the other.
 /// Errors: the error is infinite where there are too many chains.
-Exchange hidden_exchange(std::span<const Passing> passings, double tolerance);
+Exchange hidden_exchange(std::span<const Passing> passings, double tolerance, long most);
 
 /// How much A F can change while the corners of `moved` move by at most `near`.
 ///

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -28,6 +29,13 @@ struct PatchOptions {
 /// Indices: front patches first, one a (part of a) cell, in the order of the triangles; back patches after them.
 class Patches {
  public:
+  /// A convex part of a triangle inside a cell, as one triangle of a fan.
+  struct Piece {
+    std::uint32_t triangle;
+    std::array<Vec2, 3> corners;  ///< barycentric weights (u, v)
+    double area_up_to;            ///< running sum over the cell's pieces, this one included
+  };
+
   std::size_t size() const { return areas_.size(); }
   /// Patches on front sides.
   std::size_t num_cells() const { return first_piece_.size() - 1; }
@@ -37,6 +45,17 @@ class Patches {
   /// Scene units squared.
   double area(std::uint32_t patch) const { return areas_[patch]; }
   bool is_back(std::uint32_t patch) const { return patch >= num_cells(); }
+  /// The front of a back patch, or the patch itself.
+  std::uint32_t front_of(std::uint32_t patch) const {
+    return is_back(patch) ? cell_of_back_[patch - num_cells()] : patch;
+  }
+  /// The back of a front patch, or kNoPatch where the surface is single-sided.
+  std::uint32_t back_of(std::uint32_t front) const { return back_of_cell_[front]; }
+
+  /// The triangles that a front patch consists of, counter-clockwise seen from the front.
+  std::span<const Piece> pieces(std::uint32_t front) const {
+    return std::span(pieces_).subspan(first_piece_[front], first_piece_[front + 1] - first_piece_[front]);
+  }
 
   /// The patch that a ray meets, or kNoPatch at the back of a single-sided surface.
   /// Preconditions: u, v within the triangle up to rounding.
@@ -60,12 +79,6 @@ class Patches {
   friend class PatchBuilder;
   friend class ContactCutter;
 
-  /// A convex part of a triangle inside a cell, as one triangle of a fan.
-  struct Piece {
-    std::uint32_t triangle;
-    std::array<Vec2, 3> corners;  ///< barycentric weights (u, v)
-    double area_up_to;            ///< running sum over the cell's pieces, this one included
-  };
   /// The grid of a group: grid coordinates of a triangle's points are affine in (u, v).
   struct Grid {
     std::array<std::int32_t, 3> cells = {1, 1, 1};

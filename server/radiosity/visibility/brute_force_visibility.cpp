@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "common/base/check.h"
@@ -27,19 +29,40 @@ class BruteForceVisibility final : public Visibility {
     triangles.clear();
     for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
       // By bounding boxes: a superset is asked for.
+      const auto [low, high] = bounds(triangles_[i]);
       double squared = 0;
       for (int axis = 0; axis < 3; ++axis) {
-        const auto [low, high] = std::minmax({triangles_[i][0][axis], triangles_[i][1][axis], triangles_[i][2][axis]});
-        const double outside = std::max({low - point[axis], point[axis] - high, 0.0});
+        const double outside = std::max({low[axis] - point[axis], point[axis] - high[axis], 0.0});
         squared += outside * outside;
       }
       if (squared <= distance * distance) triangles.push_back(i);
     }
   }
 
+  void triangles_in(const Shaft& shaft, std::vector<std::uint32_t>& triangles) const override {
+    triangles.clear();
+    for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+      const auto [low, high] = bounds(triangles_[i]);
+      bool is_near = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [first, last] = std::minmax({shaft.begin[axis], shaft.end[axis]});
+        is_near = is_near && low[axis] <= last + shaft.radius && high[axis] >= first - shaft.radius;
+      }
+      if (is_near && shaft.may_hold(triangles_[i], 0)) triangles.push_back(i);
+    }
+  }
+
   std::string instruction_set() const override { return "double"; }
 
  private:
+  static std::pair<Vec3, Vec3> bounds(const Corners& corners) {
+    Vec3 low, high;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::tie(low[axis], high[axis]) = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+    }
+    return {low, high};
+  }
+
   Hit nearest(const Ray& ray) const {
     const Vec3 origin = to_double(ray.origin), direction = to_double(ray.direction);
     Hit best;

@@ -10,6 +10,10 @@ namespace radbake::radiosity {
 namespace {
 
 constexpr int kPacket = 16;
+/// Wider by what single precision may move points, triangles and distances.
+constexpr double kRounding = 0x1p-20;
+/// Along the axis of a shaft; a longer one has longer spheres.
+constexpr int kMostSpheres = 8;
 
 /// Fills lane k of a packet; lanes without a ray are switched off by `valid`.
 template <typename Packet>
@@ -47,6 +51,7 @@ class EmbreeVisibility final : public Visibility {
         indices[at] = static_cast<unsigned>(at);
       }
     }
+    vertices_ = vertices;
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_, geometry);
     rtcReleaseGeometry(geometry);
@@ -105,21 +110,47 @@ class EmbreeVisibility final : public Visibility {
 
   void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const override {
     triangles.clear();
-    RTCPointQueryContext context;
-    rtcInitPointQueryContext(&context);
-    RTCPointQuery query{};
-    query.x = static_cast<float>(point.x);
-    query.y = static_cast<float>(point.y);
-    query.z = static_cast<float>(point.z);
-    // Wider by what single precision may move point, triangle and distance.
-    constexpr double kRounding = 0x1p-20;
-    query.radius = static_cast<float>(distance + kRounding * (1 + distance + length(point)));
     const auto collect = [](RTCPointQueryFunctionArguments* found) {
       static_cast<std::vector<std::uint32_t>*>(found->userPtr)->push_back(found->primID);
       return false;  // the radius stays as it is
     };
-    rtcPointQuery(scene_, &query, &context, collect, &triangles);
+    query_sphere(point, distance, collect, &triangles);
     std::sort(triangles.begin(), triangles.end());
+  }
+
+  void triangles_in(const Shaft& shaft, std::vector<std::uint32_t>& triangles) const override {
+    RADBAKE_CHECK_LT(0.0, shaft.radius);
+    triangles.clear();
+    Search search{shaft, vertices_, triangles};
+    const auto collect = [](RTCPointQueryFunctionArguments* found) {
+      const Search& search = *static_cast<const Search*>(found->userPtr);
+      Corners corners;
+      double size = 0;
+      for (int corner = 0; corner < 3; ++corner) {
+        for (int axis = 0; axis < 3; ++axis) {
+          corners[corner][axis] = search.vertices[9 * std::size_t{found->primID} + 3 * corner + axis];
+          size = std::max(size, std::fabs(corners[corner][axis]));
+        }
+      }
+      if (search.shaft.may_hold(corners, kRounding * (1 + size))) search.triangles.push_back(found->primID);
+      return false;
+    };
+    // Cover the shaft with spheres along its axis, about as long as they are wide.
+    const Vec3 axis = shaft.end - shaft.begin;
+    const double whole = length(axis);
+    const int num_spheres = static_cast<int>(std::clamp(whole / (2 * shaft.radius), 1.0, double{kMostSpheres}));
+    const double half_step = whole / (2 * num_spheres);
+    const double radius = std::hypot(half_step, shaft.radius) + (num_spheres > 1 ? 0 : shaft.radius);
+    for (int k = 0; k < num_spheres; ++k) {
+      query_sphere(shaft.begin + axis * ((k + 0.5) / num_spheres), radius, collect, &search);
+    }
+    // The caps beyond both ends.
+    if (num_spheres > 1) {
+      query_sphere(shaft.begin, shaft.radius, collect, &search);
+      query_sphere(shaft.end, shaft.radius, collect, &search);
+    }
+    std::sort(triangles.begin(), triangles.end());
+    triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
   }
 
   std::string instruction_set() const override {
@@ -129,6 +160,24 @@ class EmbreeVisibility final : public Visibility {
   }
 
  private:
+  struct Search {
+    const Shaft& shaft;
+    const float* vertices;
+    std::vector<std::uint32_t>& triangles;
+  };
+
+  void query_sphere(Vec3 centre, double radius, RTCPointQueryFunction collect, void* user) const {
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    RTCPointQuery query{};
+    query.x = static_cast<float>(centre.x);
+    query.y = static_cast<float>(centre.y);
+    query.z = static_cast<float>(centre.z);
+    query.radius = static_cast<float>(radius + kRounding * (1 + radius + length(centre)));
+    rtcPointQuery(scene_, &query, &context, collect, user);
+  }
+
+  const float* vertices_ = nullptr;  ///< [9 x triangles], of the geometry
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
 };

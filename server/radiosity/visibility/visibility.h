@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -28,6 +29,26 @@ struct Hit {
   float v = 0;
 };
 
+/// A convex region: within a distance of a segment, and inside all of some half-spaces.
+struct Shaft {
+  /// Inside where dot(normal, x) >= offset.
+  struct HalfSpace {
+    Vec3 normal;  ///< unit length
+    double offset = 0;
+  };
+  Vec3 begin, end;
+  double radius = 0;  ///< > 0
+  std::vector<HalfSpace> half_spaces;
+
+  /// Whether some of a triangle's corners is inside of each half-space, or nearer to it than `margin`.
+  bool may_hold(const std::array<Vec3, 3>& corners, double margin) const {
+    return std::all_of(half_spaces.begin(), half_spaces.end(), [&](const HalfSpace& half) {
+      return std::any_of(corners.begin(), corners.end(),
+                         [&](Vec3 corner) { return dot(half.normal, corner) >= half.offset - margin; });
+    });
+  }
+};
+
 /// Answers what rays meet. Thread-safe; answers do not depend on how many threads ask.
 class Visibility {
  public:
@@ -41,6 +62,10 @@ class Visibility {
 
   /// Triangles that come within a distance of a point, ascending; a superset, never fewer.
   virtual void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const = 0;
+
+  /// Triangles that reach into a shaft, ascending; a superset, never fewer: bounds are wider by what single precision
+  /// may move them. Those that lie outside of one of its half-spaces, or far from its axis, are left out.
+  virtual void triangles_in(const Shaft& shaft, std::vector<std::uint32_t>& triangles) const = 0;
 
   /// The instruction set that rays are traced with: equal bytes are promised for one.
   virtual std::string instruction_set() const = 0;

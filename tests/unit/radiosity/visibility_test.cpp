@@ -97,6 +97,46 @@ TEST(Visibility, FindsEveryTriangleNearAPoint) {
   }
 }
 
+TEST(Visibility, FindsEveryTriangleThatReachesIntoAShaft) {
+  constexpr int kTriangles = 500, kPointsOfTriangle = 60;
+  const auto triangles = random_triangles(kTriangles, 5);
+  const auto embree = make_embree_visibility(triangles);
+  const auto slow = make_brute_force_visibility(triangles);
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> any(-1, 1), share(0, 1);
+  std::vector<std::uint32_t> found, found_slowly;
+  std::size_t num_inside = 0, num_found = 0;
+  for (int k = 0; k < 100; ++k) {
+    Shaft shaft{{any(random), any(random), any(random)}, {any(random), any(random), any(random)}, 0.02, {}};
+    if (k % 4 == 1) shaft.end = shaft.begin + (shaft.end - shaft.begin) * 0.01;
+    if (k % 4 == 2) shaft.radius = 0.3;
+    const Vec3 axis = shaft.end - shaft.begin, along = normalized(axis), across = Frame(along).s;
+    shaft.half_spaces = {{along, dot(along, shaft.begin)}, {across, dot(across, shaft.begin) - shaft.radius / 4}};
+    embree->triangles_in(shaft, found);
+    slow->triangles_in(shaft, found_slowly);
+    EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+    EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+    num_found += found.size();
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      bool is_inside = false;
+      for (int i = 0; i < kPointsOfTriangle; ++i) {
+        const double u = share(random), v = share(random) * (1 - u);
+        const Vec3 p = triangles[t][0] * (1 - u - v) + triangles[t][1] * u + triangles[t][2] * v;
+        const double s = std::clamp(dot(p - shaft.begin, axis) / dot(axis, axis), 0.0, 1.0);
+        is_inside = is_inside || (length(p - shaft.begin - axis * s) <= shaft.radius &&
+                                  std::all_of(shaft.half_spaces.begin(), shaft.half_spaces.end(),
+                                              [&](const auto& half) { return dot(half.normal, p) >= half.offset; }));
+      }
+      num_inside += is_inside;
+      EXPECT_TRUE(!is_inside || std::binary_search(found.begin(), found.end(), t)) << k << " " << t;
+      EXPECT_TRUE(!is_inside || std::binary_search(found_slowly.begin(), found_slowly.end(), t)) << k << " " << t;
+    }
+  }
+  EXPECT_GT(num_inside, 100u);
+  // It tells near from far: a superset, but a small part of all.
+  EXPECT_LT(num_found, 100u * kTriangles / 4);
+}
+
 TEST(Visibility, LetsNoRayEscapeBetweenTrianglesOfAClosedBox) {
   // A cube of 12 triangles, rays from its middle at its edges and corners among others.
   std::vector<Corners> box;

@@ -42,7 +42,8 @@ struct Distances {
   double largest_pooled = 0;  ///< in standard errors pooled over the texels
   double pooled_standard_error = 0;
 };
-/// Shapes: values [texels][kSeeds], expected [texels]. `allowed`: known errors that are no noise, lx; taken off first.
+/// Shapes: values [texels][kSeeds], expected and allowed [texels]. `allowed`: known errors that are no noise, taken off
+/// first.
 Distances distances(const std::vector<std::vector<double>>& values, const std::vector<double>& expected,
                     double allowed);
 

@@ -23,9 +23,10 @@ double ceiling_to_floor(double x, double z);
 /// Each face has a chart of RoomBuilder(3). Precondition: reflectance <= 0.6, so that E >= 0.
 Scene manufactured_room(double reflectance, int texture_size);
 
-/// A closed unit cube of one reflectance, lit by a square of 0.2 x 0.2 m amid its ceiling (y = 1) that sends 6 lm, so
-/// that the mean of E over the cube is 1 lx. The ceiling is nine quads "ceiling", the one in the middle "lamp".
+/// A closed unit cube of one reflectance, lit by a square of 1/7 x 1/7 m amid its ceiling (y = 1) that sends 6 lm, so
+/// that the mean of E over the cube is 1 lx. The ceiling is nine quads "ceiling", the one in the middle "lamp". A
+/// bake's default patches are 14 x 14 a face, four of them the lamp.
 Scene cube_with_lamp(double reflectance);
-inline constexpr double kLampLow = 0.4, kLampHigh = 0.6, kLampExitance = 150;
+inline constexpr double kLampLow = 6.0 / 14, kLampHigh = 8.0 / 14, kLampExitance = 294;
 
 }  // namespace radbake::tests

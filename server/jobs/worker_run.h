@@ -22,7 +22,7 @@ struct WorkerOptions {
   bool log_json = false;
   ProcessLimits limits;
   std::chrono::milliseconds silence_limit{10'000};    ///< without any report
-  std::chrono::milliseconds cancel_grace{60};         ///< from the request to cancel to the kill: CANCELLED within 100
+  std::chrono::milliseconds cancel_grace{40};         ///< from the request to cancel to the kill: CANCELLED within 100
   std::chrono::milliseconds exit_grace{5'000};        ///< from the accepted outcome to the kill
   std::chrono::milliseconds disconnect_grace{2'000};  ///< from a lost connection to the kill
 };

@@ -18,6 +18,11 @@ void expect_finite(const BakeOutcome& outcome) {
   for (const float value : outcome.layers[0].values) ASSERT_TRUE(std::isfinite(value));
 }
 
+float min_of(const BakeOutcome& outcome) {
+  const std::vector<float>& values = outcome.layers.at(0).values;
+  return *std::min_element(values.begin(), values.end());
+}
+
 /// Values of the texels of one mesh, which RoomBuilder laid out. Shapes: [texels]
 std::vector<Vec3> texels_of(const Scene& scene, const BakeOutcome& outcome, const std::string& name) {
   const Layer& map = outcome.layers.at(0);
@@ -76,6 +81,37 @@ TEST(HardCase10AnyUnit, GivesTheSameLightmapBitForBit) {
   }
 }
 
+TEST(HardCase13NoConvergence, IsAnErrorThatSaysSoAndNoMap) {
+  // The bound divides rounding by 1 - rho: at 1e-13 no solution meets the tolerance, not even a direct one.
+  class Silent final : public BakeObserver {
+    void on_progress(const BakeProgress&) override {}
+    void on_tile(const Tile&) override { ADD_FAILURE() << "a part of a map without a solution"; }
+  } observer;
+  BakeOptions options = kSmallBake;
+  options.max_patches = 64;
+  options.solver = Solver::kLu;
+  const auto outcome = bake_scene(tests::furnace_room(1 - 1e-13), options, observer);
+  ASSERT_FALSE(outcome.ok());
+  EXPECT_EQ(outcome.error().code, ErrorCode::kInternal);
+  EXPECT_NE(outcome.error().message.find("did not converge"), std::string::npos) << outcome.error().message;
+  EXPECT_NE(outcome.error().message.find("residual"), std::string::npos) << outcome.error().message;
+}
+
+TEST(HardCase23Emission, OfAnyStrengthGivesTheSameLightmapBitForBit) {
+  Scene scene = tests::small_emitter_room(0.5);
+  const auto one = tests::baked(scene, kSmallBake);
+  for (const double factor : {0x1p-20, 0x1p30}) {
+    Scene scaled = scene;
+    for (Material& material : scaled.materials) material.emissive = material.emissive * factor;
+    const auto other = tests::baked(scaled, kSmallBake);
+    const std::vector<float>&expected = one.layers.at(0).values, &values = other.layers.at(0).values;
+    ASSERT_EQ(values.size(), expected.size());
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      ASSERT_EQ(values[k], k % 4 == 3 ? expected[k] : static_cast<float>(expected[k] * factor)) << k;
+    }
+  }
+}
+
 Scene plate(Vec3 exitance) {
   tests::RoomBuilder builder(2);
   builder.add_quad("plate", {0, 0, 0}, {2, 0, 0}, {0, 0, -2}, builder.add_material("grey", {0.5, 0.5, 0.5}, exitance));
@@ -129,7 +165,16 @@ TEST(HardCase04Coincident, SurfacesOfABakeGiveNoNan) {
   builder.add_quad("up", {0.5, 1, 0.5}, {0, 0, 1}, {1, 0, 0}, glowing);
   builder.add_quad("down", {0.5, 1, 0.5}, {1, 0, 0}, {0, 0, 1}, glowing);
   builder.add_quad("twice", {0.5, 1, 0.5}, {1, 0, 0}, {0, 0, 1}, glowing);
-  expect_finite(tests::baked(builder.scene(), kSmallBake));
+  const FormFactors all[] = {FormFactors::kHemicube, FormFactors::kHemisphere, FormFactors::kAdaptive,
+                             FormFactors::kAnalytic};
+  for (const FormFactors form_factors : all) {
+    BakeOptions options = kSmallBake;
+    options.max_patches = 128;
+    options.form_factors = form_factors;
+    const auto outcome = tests::baked(builder.scene(), options);
+    expect_finite(outcome);
+    EXPECT_GE(min_of(outcome), 0) << form_factors_name(form_factors);
+  }
 }
 
 TEST(HardCase28Isolated, StaysDarkOrItsOwnLightWithoutNan) {

@@ -19,7 +19,14 @@ using radiosity::Solver;
 using radiosity::Transport;
 
 constexpr Transport kTransports[] = {Transport::kDense, Transport::kSparse, Transport::kStreamed};
-constexpr FormFactors kEstimators[] = {FormFactors::kHemicube, FormFactors::kHemisphere};
+constexpr FormFactors kEstimators[] = {FormFactors::kAnalytic, FormFactors::kHemicube, FormFactors::kHemisphere,
+                                       FormFactors::kAdaptive};
+
+/// Rows by formula made again for each use: right, as one test shows, and too slow for all of them.
+bool is_slow(FormFactors estimator, Transport transport) {
+  return (estimator == FormFactors::kAnalytic || estimator == FormFactors::kAdaptive) &&
+         transport == Transport::kStreamed;
+}
 
 std::string name_of(FormFactors estimator, Transport transport) {
   return std::string(form_factors_name(estimator)) + ", " + transport_name(transport);
@@ -117,6 +124,7 @@ TEST(EveryOperator, GivesTheSameBytesForAnyNumberOfThreads) {
   const Scene scene = small_emitter_room(0.7);
   for (const FormFactors estimator : kEstimators) {
     for (const Transport transport : kTransports) {
+      if (is_slow(estimator, transport)) continue;
       BakeOptions options = small_bake(estimator, transport);
       options.threads = 1;
       const BakeOutcome first = baked(scene, options);
@@ -174,6 +182,7 @@ TEST(EveryOperator, StopsInEachStageWhenItIsCancelled) {
   const Scene scene = small_emitter_room(0.9);
   for (const FormFactors estimator : kEstimators) {
     for (const Transport transport : kTransports) {
+      if (is_slow(estimator, transport)) continue;
       for (const auto stage : {radiosity::BakeStage::kPreparing, radiosity::BakeStage::kFormFactors,
                                radiosity::BakeStage::kSolving, radiosity::BakeStage::kGathering}) {
         StopAt observer(stage, stage == radiosity::BakeStage::kPreparing ? 0 : 1);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
+#include "server/radiosity/form_factor/adaptive.h"
+#include "server/radiosity/form_factor/analytic_rows.h"
 #include "server/radiosity/form_factor/hemicube_rows.h"
 #include "server/radiosity/form_factor/hemisphere_rows.h"
 #include "server/radiosity/transport/dense_operator.h"
@@ -14,11 +16,20 @@ namespace {
 
 std::unique_ptr<RowEstimator> make_estimator(const Preparation& prepared) {
   const Surfaces& surfaces = prepared.surveyed.surfaces;
+  const Patches& patches = prepared.patches;
   const Visibility& visibility = *prepared.visibility;
-  if (prepared.plan.form_factors == FormFactors::kHemicube) {
-    return std::make_unique<HemicubeEstimator>(surfaces, prepared.patches, visibility);
+  const BakePlan& plan = prepared.plan;
+  switch (plan.form_factors) {
+    case FormFactors::kAnalytic:
+      return std::make_unique<AnalyticEstimator>(surfaces, patches, visibility, AnalyticEstimator::kTolerance,
+                                                 plan.transport != Transport::kStreamed);
+    case FormFactors::kHemicube: return std::make_unique<HemicubeEstimator>(surfaces, patches, visibility);
+    case FormFactors::kAdaptive:
+      return std::make_unique<AdaptiveEstimator>(surfaces, patches, visibility, plan.rays_per_row);
+    case FormFactors::kAuto:
+    case FormFactors::kHemisphere: break;
   }
-  return std::make_unique<HemisphereRows>(surfaces, prepared.patches, visibility, prepared.plan.rays_per_row);
+  return std::make_unique<HemisphereRows>(surfaces, patches, visibility, plan.rays_per_row);
 }
 
 struct TakenRow {

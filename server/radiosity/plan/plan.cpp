@@ -41,7 +41,8 @@ int max_patches_of(const BakeOptions& options) {
 void choose_methods(const BakeOptions& options, BakePlan& plan) {
   plan.form_factors = options.form_factors == FormFactors::kAuto ? FormFactors::kHemisphere : options.form_factors;
 
-  // By formula a row may have every patch in it, by rays no more than it has rays.
+  // By formula a row may have every patch in it, by rays no more than it has rays. (The exchanges that both directions
+  // of a pair share by formula are less than what their rows take later.)
   std::uint64_t row_entries = plan.num_patches;
   if (plan.form_factors == FormFactors::kHemisphere) row_entries = static_cast<std::uint64_t>(plan.rays_per_row);
   if (plan.form_factors == FormFactors::kHemicube) row_entries = 3 * kHemicubeResolution * kHemicubeResolution;

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 #include "server/study/cases.h"
 
@@ -20,6 +21,7 @@ namespace {
 constexpr int kPanelWidth = 560, kPanelHeight = 560;
 /// Lines of the legend below a panel, as a share of its height.
 constexpr double kLegendLine = 0.042;
+constexpr std::size_t kLegendRows = 5;
 
 /// Text in gnuplot's single quotes.
 std::string quoted(const std::string& text) {
@@ -63,11 +65,16 @@ std::string panel_script(const Panel& panel, int index, int num_panels) {
   text +=
       panel.is_x_logarithmic ? "set logscale x 10\nset format x '10^{%T}'\n" : "unset logscale x\nset format x '%g'\n";
   text += "set yrange [" + (panel.smallest_y > 0 ? number(panel.smallest_y) : std::string("*")) + ":*]\n";
-  text += "set bmargin screen " + number(0.13 + kLegendLine * static_cast<double>(panel.curves.size())) + "\n";
-  text += "plot ";
+  text += "set xrange [*:" + (panel.largest_x > 0 ? number(panel.largest_x) : std::string("*")) + "]\n";
+  // Long legends are set in two columns.
+  const std::size_t rows = panel.curves.size() > kLegendRows ? (panel.curves.size() + 1) / 2 : panel.curves.size();
+  text += "set key maxrows " + std::to_string(rows) + "\n";
+  text += "set bmargin screen " + number(0.13 + kLegendLine * static_cast<double>(rows)) + "\n";
+  std::string separator = "plot ";
   for (std::size_t k = 0; k < panel.curves.size(); ++k) {
     const Curve& curve = panel.curves[k];
-    text += std::string(k == 0 ? "" : ", \\\n     ") + "$curve_" + std::to_string(index) + "_" + std::to_string(k) +
+    if (curve.points.empty()) continue;
+    text += std::exchange(separator, ", \\\n     ") + "$curve_" + std::to_string(index) + "_" + std::to_string(k) +
             " using 1:2 title " + quoted(curve.title) + " " + style_of(curve, static_cast<int>(k));
   }
   return text + "\n";
@@ -83,7 +90,7 @@ std::string script_of(const Plot& plot, const std::string& stem) {
           quoted(stem + ".png") + "\n"};
   std::string text =
       "set encoding utf8\nset logscale y 10\nset format y '10^{%T}'\nset grid lc rgb '#dddddd'\n"
-      "set key below left vertical maxcols 1 Left reverse samplen 3 spacing 1.1 height 0.5\n"
+      "set key below left vertical Left reverse samplen 3 spacing 1.1 height 0.5\n"
       "set lmargin 11\nset rmargin 3\n";
   for (const std::string& terminal : terminals) {
     text += terminal + "set multiplot\n";

@@ -9,7 +9,7 @@
 
 namespace radbake::study {
 
-/// A curve of a plot.
+/// A curve of a plot. Without points it is not drawn, and the colours of those after it stay as they are.
 struct Curve {
   std::string title;                          ///< in the legend
   std::vector<std::array<double, 2>> points;  ///< x, y; those not above 0 are left out, as axes are logarithmic
@@ -24,6 +24,7 @@ struct Panel {
   std::vector<Curve> curves;
   bool is_x_logarithmic = true;
   double smallest_y = 0;  ///< lower end of the axis; 0: as the curves need
+  double largest_x = 0;   ///< right end of the axis; 0: as the curves need
 };
 
 /// Panels side by side.

@@ -1,0 +1,117 @@
+#include "server/study/commands.h"
+
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "server/settings/to_options.h"
+#include "server/study/bake_study.h"
+#include "server/study/cases.h"
+#include "server/study/convergence_study.h"
+#include "server/study/enclosure_study.h"
+#include "server/study/rates_study.h"
+#include "server/study/study_scene.h"
+
+namespace radbake::study {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+ExitCode fail(const Error& error, ExitCode code) {
+  std::cerr << "radbake-study: error: " << error.message << '\n';
+  return code;
+}
+
+/// Reads the cases, studies them, prints the table and writes the JSON.
+ExitCode run_cases(const CaseChoices& choices, const std::function<Json(const Json&)>& study,
+                   const std::function<std::string(const Json&)>& table) {
+  const auto cases = read_cases(choices.cases);
+  if (!cases.ok()) return fail(cases.error(), kBadInput);
+  const Json result = study(*cases);
+  std::cout << table(result);
+  if (choices.json.empty()) return kDone;
+  const auto written = write_text(choices.json, result.dump(2) + "\n");
+  return written.ok() ? kDone : fail(written.error(), kNotWritten);
+}
+
+Result<void> make_folder(const std::string& folder) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure) return internal_error("cannot make the folder " + folder + ": " + failure.message());
+  return {};
+}
+
+/// Writes a table and a plot of it to a folder. The table is there even where the plot cannot be drawn.
+ExitCode write_study(const std::string& folder, const std::string& name, const std::string& csv, const Plot& plot) {
+  const std::filesystem::path table = std::filesystem::path(folder) / (name + ".csv");
+  const auto written = write_text(table, csv);
+  if (!written.ok()) return fail(written.error(), kNotWritten);
+  const auto drawn = draw(plot, folder, name);
+  if (drawn.ok()) return kDone;
+  Error error = drawn.error();
+  error.message += "; the numbers are in " + table.string();
+  return fail(error, kNotWritten);
+}
+
+/// Reads a scene and prints its warnings.
+Result<Scene> read_scene(const SceneChoices& choices) {
+  RADBAKE_ASSIGN_OR_RETURN(StudyScene read, read_study_scene(choices.scene, choices.bake));
+  for (const Warning& warning : read.warnings) std::cerr << "radbake-study: warning: " << warning.text << '\n';
+  return std::move(read.scene);
+}
+
+radiosity::BakeOptions bake_options(const SceneChoices& choices) {
+  return settings::to_options(options::to_settings(choices.bake), options::to_run_options(choices.bake));
+}
+
+}  // namespace
+
+ExitCode run_form_factors(const CaseChoices& choices) {
+  const auto estimator = pair_estimator_by_name(choices.estimator);
+  if (!estimator.ok()) return fail(estimator.error(), kUsage);
+  const auto study = [&](const Json& cases) { return study_form_factors(cases, *estimator, choices.tolerance); };
+  return run_cases(choices, study, form_factor_table);
+}
+
+ExitCode run_enclosures(const CaseChoices& choices) {
+  const auto study = [&](const Json& cases) { return study_enclosures(cases, choices.tolerance); };
+  return run_cases(choices, study, enclosure_table);
+}
+
+ExitCode run_rates(const std::string& path, const std::string& folder) {
+  const auto cases = read_cases(path);
+  if (!cases.ok()) return fail(cases.error(), kBadInput);
+  // Before the minutes that follow.
+  if (const auto made = make_folder(folder); !made.ok()) return fail(made.error(), kNotWritten);
+  const RateStudy study = study_rates(*cases, {});
+  std::cout << rate_table(study);
+  return write_study(folder, "rates", rate_csv(study), rate_plot(study));
+}
+
+ExitCode run_convergence(const SceneChoices& choices) {
+  const auto scene = read_scene(choices);
+  if (!scene.ok()) return fail(scene.error(), kBadInput);
+  if (const auto made = make_folder(choices.folder); !made.ok()) return fail(made.error(), kNotWritten);
+  const auto study = study_convergence_of(*scene, bake_options(choices), choices.tolerance);
+  if (!study.ok()) return fail(study.error(), kBadInput);
+  std::cout << convergence_table(*study);
+  return write_study(choices.folder, "convergence", convergence_csv(*study), convergence_plot(*study));
+}
+
+ExitCode run_bake(const SceneChoices& choices) {
+  const auto scene = read_scene(choices);
+  if (!scene.ok()) return fail(scene.error(), kBadInput);
+  if (const auto made = make_folder(choices.folder); !made.ok()) return fail(made.error(), kNotWritten);
+  const auto bake = bake_timed(*scene, bake_options(choices));
+  if (!bake.ok()) {
+    return fail(bake.error(), bake.error().code == ErrorCode::kInvalidArgument ? kBadInput : kFailed);
+  }
+  for (const Warning& warning : bake->outcome.report.warnings) {
+    std::cerr << "radbake-study: warning: " << warning.text << '\n';
+  }
+  std::cout << bake_table(*bake);
+  const auto written = write_lightmaps(bake->outcome, choices.folder);
+  return written.ok() ? kDone : fail(written.error(), kNotWritten);
+}
+
+}  // namespace radbake::study

@@ -24,7 +24,7 @@ using radiosity::SolveView;
 using radiosity::TransportOperator;
 
 constexpr int kMinTimedRuns = 3, kMaxTimedRuns = 50;
-constexpr double kTimedSeconds = 1;
+constexpr double kTimedSeconds = 0.3;
 /// The reference is so much better than what the solvers are asked for, as far as rounding allows.
 constexpr double kReferenceShare = 1e-3;
 constexpr int kMaxSweepsOfReference = 2000, kMaxSweeps = 100'000;

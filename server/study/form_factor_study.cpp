@@ -7,7 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "server/radiosity/form_factor/adaptive.h"
 #include "server/radiosity/form_factor/analytic.h"
+#include "server/radiosity/form_factor/analytic_polygon.h"
 #include "server/study/cases.h"
 #include "server/study/sampled_pair.h"
 
@@ -23,7 +25,8 @@ constexpr double kLoosest = 10;
 
 constexpr std::pair<const char*, PairEstimator> kEstimators[] = {{"analytic", PairEstimator::kAnalytic},
                                                                  {"hemicube", PairEstimator::kHemicube},
-                                                                 {"hemisphere", PairEstimator::kHemisphere}};
+                                                                 {"hemisphere", PairEstimator::kHemisphere},
+                                                                 {"adaptive", PairEstimator::kAdaptive}};
 
 struct Found {
   double form_factor = 0;
@@ -31,21 +34,38 @@ struct Found {
   const char* method = "";
 };
 
+/// Precondition: corners in a plane.
+radiosity::PatchExtent extent_of(const radiosity::PolygonCorners& corners) {
+  const Vec3 twice_area = radiosity::twice_area_vector(corners);
+  radiosity::PatchExtent extent{{}, 0, length(twice_area) / 2};
+  // The mean of a fan of triangles, those that the outline folds back with negative area.
+  Vec3 offset;
+  for (std::size_t k = 1; k + 1 < corners.size(); ++k) {
+    const Vec3 a = corners[k] - corners[0], b = corners[k + 1] - corners[0];
+    offset += (a + b) / 3 * (dot(cross(a, b), twice_area) / dot(twice_area, twice_area));
+  }
+  extent.middle = corners[0] + offset;
+  extent.radius = radiosity::radius_about(extent.middle, corners);
+  return extent;
+}
+
 /// Finds the form factor of one pair by one method.
 class PairStudy {
  public:
   PairStudy(PairEstimator estimator, double tolerance)
       : estimator_(estimator),
         tolerance_(tolerance),
-        points_(estimator == PairEstimator::kHemisphere ? kMaxRaysOfReplicate : kMaxSitesOfReplicate) {}
+        points_(estimator == PairEstimator::kHemisphere || estimator == PairEstimator::kAdaptive
+                    ? kMaxRaysOfReplicate
+                    : kMaxSitesOfReplicate) {}
 
   Result<Found> find(const PolygonCase& pair) const {
-    if (estimator_ == PairEstimator::kAnalytic) {
-      RADBAKE_ASSIGN_OR_RETURN(const radiosity::PolygonFormFactor found,
-                               radiosity::polygon_form_factor(pair.from, pair.to, pair.occluders, tolerance_));
-      return Found{found.form_factor, found.stated_error, radiosity::analytic_method_name(found.method)};
-    }
+    if (estimator_ == PairEstimator::kAnalytic) return by_formula(pair);
     RADBAKE_ASSIGN_OR_RETURN(const PolygonPair local, PolygonPair::make(pair));
+    if (estimator_ == PairEstimator::kAdaptive &&
+        radiosity::is_near_or_large(extent_of(local.local().from), extent_of(local.local().to))) {
+      return by_formula(pair);
+    }
     const bool is_hemicube = estimator_ == PairEstimator::kHemicube;
     const SampledFormFactor found =
         is_hemicube ? sampled_by_hemicubes(local, points_, tolerance_) : sampled_by_rays(local, points_, tolerance_);
@@ -88,6 +108,12 @@ class PairStudy {
   }
 
  private:
+  Result<Found> by_formula(const PolygonCase& pair) const {
+    RADBAKE_ASSIGN_OR_RETURN(const radiosity::PolygonFormFactor found,
+                             radiosity::polygon_form_factor(pair.from, pair.to, pair.occluders, tolerance_));
+    return Found{found.form_factor, found.stated_error, radiosity::analytic_method_name(found.method)};
+  }
+
   PairEstimator estimator_;
   double tolerance_;
   SobolPoints points_;

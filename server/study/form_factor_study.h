@@ -9,8 +9,8 @@
 namespace radbake::study {
 
 /// analytic: by formula; hemicube, hemisphere: sampled, until the stated error is within the tolerance or their limits
-/// (sampled_pair.h) end it.
-enum class PairEstimator { kAnalytic, kHemicube, kHemisphere };
+/// (sampled_pair.h) end it; adaptive: by formula where the pair is near or subtends much, else by rays.
+enum class PairEstimator { kAnalytic, kHemicube, kHemisphere, kAdaptive };
 
 /// Errors: kInvalidArgument that lists the names.
 Result<PairEstimator> pair_estimator_by_name(std::string_view name);

@@ -25,9 +25,11 @@ std::string check_estimator(const std::string& text) {
 CLI::App* add_form_factors(CLI::App& app, CaseChoices& choices) {
   CLI::App* sub = app.add_subcommand("form-factors", "Form factors of polygon pairs, against known values");
   sub->add_option("CASES", choices.cases, "List of cases: polygons, from, to, occluders, exact")->required();
-  sub->add_option("--estimator", choices.estimator,
-                  "How: analytic (by formula), hemisphere (rays) or hemicube; the sampled ones go on until the error "
-                  "that they state is within the tolerance or their limit of rays ends it")
+  sub->add_option(
+         "--estimator", choices.estimator,
+         "How: analytic (by formula), hemisphere (rays), hemicube, or adaptive (near and large pairs by formula, "
+         "others by rays); what is sampled goes on until the error that it states is within the tolerance or "
+         "its limit of rays ends it")
       ->check(check_estimator, "")
       ->capture_default_str();
   sub->add_option("--tolerance", choices.tolerance, "Error that is asked for, absolute")

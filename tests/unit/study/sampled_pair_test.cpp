@@ -110,9 +110,29 @@ TEST(SampledPair, RefusesWhatTheFormulaRefuses) {
 TEST(FormFactorStudy, NamesTheEstimatorsThatThereAre) {
   EXPECT_EQ(pair_estimator_by_name("hemicube").value(), PairEstimator::kHemicube);
   const std::string message = pair_estimator_by_name("radar").error().message;
-  for (const char* name : {"radar", "analytic", "hemicube", "hemisphere"}) {
+  for (const char* name : {"radar", "analytic", "hemicube", "hemisphere", "adaptive"}) {
     EXPECT_NE(message.find(name), std::string::npos) << name;
   }
+}
+
+TEST(FormFactorStudy, AdaptiveTakesTheFormulaForNearAndLargePairsAndRaysForOthers) {
+  // Unit squares: edge to edge; a side apart; 4 sides apart, where one holds 1 / (16 pi) of the other's sky.
+  const auto cases = nlohmann::ordered_json::parse(R"([
+    {"id": "touching", "from": 0, "to": 1, "exact": 0.20004377607540316,
+     "polygons": [[[0,0,0],[1,0,0],[1,1,0],[0,1,0]], [[1,0,0],[1,0,1],[1,1,1],[1,1,0]]]},
+    {"id": "large", "from": 0, "to": 1, "exact": 0.19982489569838738,
+     "polygons": [[[0,0,0],[1,0,0],[1,1,0],[0,1,0]], [[0,1,1],[1,1,1],[1,0,1],[0,0,1]]]},
+    {"id": "far", "from": 0, "to": 1,
+     "polygons": [[[0,0,0],[1,0,0],[1,1,0],[0,1,0]], [[0,1,4],[1,1,4],[1,0,4],[0,0,4]]]}])");
+  const auto found = study_form_factors(cases, PairEstimator::kAdaptive, kTolerance)["cases"];
+  EXPECT_EQ(found[0]["method"], "contour");
+  EXPECT_EQ(found[1]["method"], "contour");
+  EXPECT_TRUE(found[0]["pass"].get<bool>());
+  EXPECT_TRUE(found[1]["pass"].get<bool>());
+  EXPECT_EQ(found[2]["method"], "hemisphere");
+  const auto exact = study_form_factors(cases, PairEstimator::kAnalytic, kTolerance)["cases"][2];
+  EXPECT_LE(std::fabs(found[2]["form_factor"].get<double>() - exact["form_factor"].get<double>()),
+            found[2]["stated_error"].get<double>());
 }
 
 TEST(FormFactorStudy, JudgesSampledCasesByTheSameRule) {

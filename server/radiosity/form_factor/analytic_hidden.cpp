@@ -8,9 +8,9 @@ namespace radbake::radiosity {
 namespace {
 
 constexpr int kMostChains = 256;
-// How much polygons shrink for general position: a part in 4e9, but at least so much that rounding stays a small part
+// How much polygons shrink for general position: a part in 3e10, but at least so much that rounding stays a small part
 // of it. Each by its own multiple, by the golden ratio: equal steps would leave what lies in one plane in one plane.
-constexpr double kShrinkage = 0x1p-32, kShrinkageOverRounding = 0x1p-46;
+constexpr double kShrinkage = 0x1p-35, kShrinkageOverRounding = 0x1p-46;
 
 double shrinkage_of(const PolygonCorners& corners, std::size_t place) {
   const double inradius = 2 * polygon_area(corners) / perimeter(corners);

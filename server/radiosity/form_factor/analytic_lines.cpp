@@ -198,8 +198,9 @@ class Crossing {
       for (std::size_t m = 0; m < chain_.size(); ++m) {
         if (m == i || m == j) continue;
         const PolygonCorners& c = chain_[m];
-        for (std::size_t k = 0; k < c.size(); ++k)
+        for (std::size_t k = 0; k < c.size(); ++k) {
           normals_.push_back(normal_through(x, c[k], c[k + 1 == c.size() ? 0 : k + 1]));
+        }
       }
       for (const Vec3& y : b) {
         const WideVec3 d = difference(y, x);

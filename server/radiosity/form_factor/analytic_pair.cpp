@@ -1,9 +1,8 @@
 #include "server/radiosity/form_factor/analytic_pair.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
-
-#include "server/radiosity/form_factor/analytic_lines.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -17,6 +16,8 @@ constexpr double kContourError = 1e-10, kContourRelativeError = 1e-9;
 constexpr double kUnoccludedError = 1e-12;
 // Of the open value: above it, what is left of a far pair would have no digits, and the visible part is integrated.
 constexpr double kMostHiddenError = 1e-2;
+// How often a piece is cut where there are too many chains of occluders to count.
+constexpr int kMostCuts = 4;
 
 /// Whether one convex occluder covers the whole shaft: every corner's view of every corner.
 bool hides_all(const Piece& occluder, const Piece& p, const Piece& q) {
@@ -60,116 +61,6 @@ PairExchange unoccluded_exchange(const Piece& p, const Piece& q) {
   return {smooth, AnalyticMethod::kQuadrature};
 }
 
-/// Sides of a half-space that a polygon reaches.
-struct Reach {
-  bool front = false, back = false;
-};
-Reach reach_of(const PolygonCorners& corners, const HalfSpace& plane) {
-  Reach reach;
-  for (const Vec3& corner : corners) {
-    const int side = plane.side(corner);
-    reach.front = reach.front || side > 0;
-    reach.back = reach.back || side < 0;
-  }
-  return reach;
-}
-
-PolygonCorners part_inside(const PolygonCorners& corners, const HalfSpace& inside, bool reaches_outside) {
-  if (!reaches_outside) return corners;
-  PolygonCorners part;
-  clip_convex(corners, inside, part);
-  return part;
-}
-
-PolygonCorners reversed(const PolygonCorners& corners) { return {corners.rbegin(), corners.rend()}; }
-
-/// Finds the light from p to q that passes through each occluder.
-class PassingFinder {
- public:
-  PassingFinder(const Piece& p, const Piece& q, const Occluders& occluders)
-      : p_(p), q_(q), occluders_(occluders), q_reversed_(reversed(q.corners)) {}
-
-  /// Whether bodies hold parts of the patches: then their faces cannot be counted one by one.
-  bool is_tangled() const { return is_tangled_; }
-  /// Whether one patch is in a body and the other out of it, or one occluder hides all.
-  bool hides_all() const {
-    return is_walled_off_ ||
-           std::any_of(passings_.begin(), passings_.end(), [](const Passing& passing) { return passing.hides_all; });
-  }
-  std::span<const Passing> passings() const { return passings_; }
-
-  /// Returns whether the occluder reaches the lines between p and q.
-  bool find(std::uint32_t k) {
-    const Piece& occluder = occluders_.pieces()[k];
-    const Reach in_front_of_p = reach_of(occluder.corners, p_.front);
-    const Reach in_front_of_q = reach_of(occluder.corners, q_.front);
-    if (!in_front_of_p.front || !in_front_of_q.front) return false;
-    const Reach p_side = reach_of(p_.corners, occluder.front), q_side = reach_of(q_.corners, occluder.front);
-    bool enters = p_side.front && q_side.back, leaves = p_side.back && q_side.front;
-    if (!enters && !leaves) return false;
-    PolygonCorners between = part_inside(occluder.corners, p_.front, in_front_of_p.back);
-    if (!between.empty()) between = part_inside(between, q_.front, in_front_of_q.back);
-    if (between.empty()) return false;
-
-    const std::size_t before = passings_.size();
-    if (enters) add(k, between, false, p_side, q_side);
-    if (leaves) add(k, between, true, p_side, q_side);
-    if (passings_.size() == before) return false;
-    // Lines that start outside of a body are counted where they enter it, others where they leave it.
-    const std::uint32_t body = occluders_.body_of(k);
-    if (body != kNoBody) {
-      const auto [place_p, place_q] = places_of_patches(body);
-      is_tangled_ = is_tangled_ || place_p == Place::kAcross || place_q == Place::kAcross;
-      is_walled_off_ = is_walled_off_ || (place_p != place_q && !is_tangled_);
-      const bool counts_entries = place_p == Place::kOutside;
-      std::erase_if(passings_, [&](const Passing& passing) {
-        return passing.occluder == k && (passing.ahead.normal == occluder.front.normal) == counts_entries;
-      });
-    }
-    return true;
-  }
-
- private:
-  void add(std::uint32_t k, const PolygonCorners& between, bool leaves, Reach p_side, Reach q_side) {
-    const Piece& occluder = occluders_.pieces()[k];
-    const HalfSpace ahead = leaves ? occluder.front : occluder.front.reversed();
-    const bool cuts_p = leaves ? p_side.front : p_side.back, cuts_q = leaves ? q_side.back : q_side.front;
-    Passing passing;
-    passing.p = part_inside(p_.corners, ahead.reversed(), cuts_p);
-    passing.q = part_inside(q_reversed_, ahead, cuts_q);
-    if (passing.p.empty() || passing.q.empty()) return;
-    passing.between = leaves ? between : reversed(between);
-    const Passage passage = passage_of(passing.p, passing.q, passing.between);
-    if (passage == Passage::kBeside) return;
-    const std::uint32_t body = occluders_.body_of(k);
-    passing.ahead = ahead;
-    passing.item = body == kNoBody ? static_cast<std::uint32_t>(occluders_.pieces().size()) + k : body;
-    passing.occluder = k;
-    passing.hides_all = passage == Passage::kThrough && !cuts_p && !cuts_q;
-    passings_.push_back(std::move(passing));
-  }
-
-  std::pair<Place, Place> places_of_patches(std::uint32_t body) {
-    for (const Places& known : places_) {
-      if (known.body == body) return {known.p, known.q};
-    }
-    places_.push_back({body, place_of(p_, occluders_, body), place_of(q_, occluders_, body)});
-    return {places_.back().p, places_.back().q};
-  }
-
-  struct Places {
-    std::uint32_t body;
-    Place p, q;
-  };
-  const Piece& p_;
-  const Piece& q_;
-  const Occluders& occluders_;
-  PolygonCorners q_reversed_;
-  std::vector<Passing> passings_;
-  std::vector<Places> places_;
-  bool is_tangled_ = false, is_walled_off_ = false;
-};
-
 Exchange visible_past(const Piece& p, const Piece& q, const std::vector<Piece>& occluders, double tolerance,
                       long most) {
   for (const Piece& occluder : occluders) {
@@ -183,6 +74,99 @@ Exchange visible_past(const Piece& p, const Piece& q, const std::vector<Piece>& 
   }
   const bool over_p = from_p > from_q || (from_p == from_q && polygon_area(p.corners) <= polygon_area(q.corners));
   return visible_exchange(over_p ? p : q, over_p ? q : p, occluders, tolerance, most);
+}
+
+/// Corners are known to 8 ulp.
+double given_error(const Piece& p, const Piece& q) {
+  return movement_error(p.corners, p.front.near, q.corners) + movement_error(q.corners, q.front.near, p.corners);
+}
+
+/// What is open, and what of it is left.
+struct Difference : Exchange {
+  double open = 0;
+};
+
+struct Effort {
+  double tolerance = 0;
+  long most = 0;
+  int num_cuts = 0;
+};
+
+Difference open_less_hidden(const Piece& p, const Piece& q, const Passings& passings, const Occluders& occluders,
+                            const Effort& effort);
+
+/// Adds up over parts of p. They are cut from what is in front of q, so only what is between them changes.
+Difference sum_over_parts(std::span<const PolygonCorners> parts, const Piece& p, const Piece& q,
+                          const Passings& passings, const Occluders& occluders, const Effort& effort) {
+  const auto num_parts = static_cast<double>(parts.size());
+  const Effort of_part{effort.tolerance / num_parts, effort.most, effort.num_cuts + 1};
+  Difference sum;
+  for (const PolygonCorners& corners : parts) {
+    const Piece part{corners, p.front};
+    const Passings own = find_passings(part, q, occluders, passings.in_shaft);
+    if (own.hides_all) continue;
+    const Difference one = open_less_hidden(part, q, own, occluders, of_part);
+    sum.value += one.value;
+    sum.error += one.error;
+    sum.evaluations += one.evaluations;
+    sum.open += one.open;
+  }
+  return sum;
+}
+
+/// What of a piece lies in a body, and what does not.
+std::vector<PolygonCorners> parts_by_body(const Piece& p, const Occluders& occluders, std::uint32_t body) {
+  std::vector<HalfSpace> inside;
+  for (const std::uint32_t k : occluders.faces(body)) inside.push_back(occluders.pieces()[k].front.reversed());
+  std::vector<PolygonCorners> parts = {p.corners};
+  remove_convex(parts, inside);
+  PolygonCorners rest = p.corners;
+  for (const HalfSpace& half : inside) {
+    const Reach reach = reach_of(rest, half);
+    if (reach.back) rest = part_inside(rest, half, true);
+  }
+  if (!rest.empty()) parts.push_back(std::move(rest));
+  return parts;
+}
+
+std::vector<PolygonCorners> halves(const Piece& p) {
+  const std::size_t n = p.corners.size();
+  std::size_t longest = 0;
+  const auto edge = [&](std::size_t k) { return p.corners[(k + 1) % n] - p.corners[k]; };
+  for (std::size_t k = 1; k < n; ++k) {
+    if (dot(edge(k), edge(k)) > dot(edge(longest), edge(longest))) longest = k;
+  }
+  const HalfSpace half{mean_corner(p.corners), normalized(edge(longest)), 0, 0};
+  std::vector<PolygonCorners> parts;
+  for (const HalfSpace& side : {half, half.reversed()}) {
+    PolygonCorners part;
+    clip_convex(p.corners, side, part);
+    if (!part.empty()) parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+Difference open_less_hidden(const Piece& p, const Piece& q, const Passings& passings, const Occluders& occluders,
+                            const Effort& effort) {
+  const bool may_cut = effort.num_cuts < kMostCuts;
+  if (passings.tangled_body != kNoBody && may_cut) {
+    // Lines from within a body and from outside of it are counted at different faces.
+    const bool is_p = place_of(p, occluders, passings.tangled_body) == Place::kAcross;
+    return sum_over_parts(parts_by_body(is_p ? p : q, occluders, passings.tangled_body), is_p ? p : q, is_p ? q : p,
+                          passings, occluders, effort);
+  }
+  const PairExchange open = unoccluded_exchange(p, q);
+  const Difference nothing_known{{open.value / 2, open.value / 2 + open.error, open.evaluations}, open.value};
+  if (passings.tangled_body != kNoBody) return nothing_known;
+  const Exchange hidden =
+      hidden_exchange(passings.all, effort.tolerance / 2, std::min(effort.most, kMostHiddenEvaluations));
+  if (std::isfinite(hidden.error)) {
+    return {{open.value - hidden.value, open.error + hidden.error, open.evaluations + hidden.evaluations}, open.value};
+  }
+  if (!may_cut) return nothing_known;
+  const bool p_is_larger = polygon_area(p.corners) >= polygon_area(q.corners);
+  const Piece &larger = p_is_larger ? p : q, &other = p_is_larger ? q : p;
+  return sum_over_parts(halves(larger), larger, other, passings, occluders, effort);
 }
 
 }  // namespace
@@ -209,51 +193,34 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
   const Piece q{part_inside(whole_q.corners, whole_p.front, q_reach.back), whole_q.front};
   if (p.corners.empty() || q.corners.empty()) return {};
 
-  // Find what is between.
-  PassingFinder finder(p, q, occluders);
-  std::vector<std::uint32_t> in_shaft;
-  for (const std::uint32_t k : candidates) {
-    if (finder.find(k)) in_shaft.push_back(k);
-    if (finder.hides_all()) return {{0, 0, 0}, AnalyticMethod::kOccluded};
+  const Passings passings = find_passings(p, q, occluders, candidates);
+  if (passings.hides_all) return {{}, AnalyticMethod::kOccluded};
+  if (passings.in_shaft.empty()) {
+    PairExchange result = unoccluded_exchange(p, q);
+    if (result.value > 0) result.error += given_error(p, q);
+    return result;
   }
-
-  PairExchange result;
-  bool is_difference = false;
-  if (in_shaft.empty()) {
-    result = unoccluded_exchange(p, q);
-  } else {
-    result = {{0, std::numeric_limits<double>::infinity(), 0}, AnalyticMethod::kOccluded};
-    double open_value = 0;
-    is_difference = true;
-    if (!finder.is_tangled()) {
-      // What is open, less what is hidden.
-      const PairExchange open = unoccluded_exchange(p, q);
-      const Exchange hidden = hidden_exchange(finder.passings(), tolerance / 2, std::min(most, kMostHiddenEvaluations));
-      open_value = open.value;
-      result.value = open.value - hidden.value;
-      result.error = open.error + hidden.error;
-      result.evaluations = open.evaluations + hidden.evaluations;
-    }
-    if (!(result.error <= std::min(tolerance, kMostHiddenError * open_value))) {
-      std::vector<Piece> pieces;
-      for (const std::uint32_t k : in_shaft) pieces.push_back(occluders.pieces()[k]);
-      const Exchange visible = visible_past(p, q, pieces, tolerance, most);
-      if (visible.error <= std::max(tolerance, result.error)) {
-        result = {visible, AnalyticMethod::kOccluded};
-        is_difference = false;
-      }
-    }
+  const Difference difference = open_less_hidden(p, q, passings, occluders, {tolerance, most, 0});
+  PairExchange result{{difference.value, difference.error, difference.evaluations}, AnalyticMethod::kOccluded};
+  bool may_be_none = true;
+  if (!(result.error <= std::min(tolerance, kMostHiddenError * difference.open))) {
+    // What is visible has more digits, or is all there is; the difference bounds it.
+    std::vector<Piece> pieces;
+    for (const std::uint32_t k : passings.in_shaft) pieces.push_back(occluders.pieces()[k]);
+    const Exchange visible = visible_past(p, q, pieces, tolerance, most);
+    const double low = std::max(0.0, result.value - result.error), high = result.value + result.error;
+    const double value = std::clamp(visible.value, low, std::max(low, high));
+    result.error = std::max(value - low, high - value);
+    result.value = value;
+    result.evaluations += visible.evaluations;
+    may_be_none = false;
   }
-
-  // Corners are known to 8 ulp.
-  double given =
-      movement_error(p.corners, p.front.near, q.corners) + movement_error(q.corners, q.front.near, p.corners);
-  for (const std::uint32_t k : in_shaft) {
+  if (result.value > 0 || result.error > 0) result.error += given_error(p, q);
+  for (const std::uint32_t k : passings.in_shaft) {
     const Piece& occluder = occluders.pieces()[k];
-    given += occluder.front.near * perimeter(occluder.corners);
+    if (result.error > 0) result.error += occluder.front.near * perimeter(occluder.corners);
   }
-  if (result.value > 0 || result.error > 0) result.error += given;
-  if (is_difference && result.value <= result.error) {
+  if (may_be_none && result.value <= result.error) {
     result.error += std::max(result.value, 0.0);
     result.value = 0;
   }

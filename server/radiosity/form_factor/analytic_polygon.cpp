@@ -135,6 +135,23 @@ void clip_convex(const PolygonCorners& corners, const HalfSpace& inside, Polygon
   if (!any_inside || clipped.size() < 3) clipped.clear();
 }
 
+Reach reach_of(std::span<const Vec3> corners, const HalfSpace& plane) {
+  Reach reach;
+  for (const Vec3& corner : corners) {
+    const int side = plane.side(corner);
+    reach.front = reach.front || side > 0;
+    reach.back = reach.back || side < 0;
+  }
+  return reach;
+}
+
+PolygonCorners part_inside(const PolygonCorners& corners, const HalfSpace& inside, bool reaches_outside) {
+  if (!reaches_outside) return corners;
+  PolygonCorners part;
+  clip_convex(corners, inside, part);
+  return part;
+}
+
 void remove_convex(std::vector<PolygonCorners>& polygons, std::span<const HalfSpace> hole) {
   std::vector<PolygonCorners> left;
   PolygonCorners outside, inside;

@@ -55,6 +55,17 @@ Result<std::vector<Piece>> convex_pieces(const PolygonCorners& corners, const Ha
 /// Source: Sutherland & Hodgman 1974.
 void clip_convex(const PolygonCorners& corners, const HalfSpace& inside, PolygonCorners& clipped);
 
+/// On which sides of a plane a polygon has corners.
+struct Reach {
+  bool front = false, back = false;
+};
+Reach reach_of(std::span<const Vec3> corners, const HalfSpace& plane);
+
+/// clip_convex, or the polygon itself where it reaches no further.
+PolygonCorners part_inside(const PolygonCorners& corners, const HalfSpace& inside, bool reaches_outside);
+
+inline PolygonCorners reversed(const PolygonCorners& corners) { return {corners.rbegin(), corners.rend()}; }
+
 /// Takes the intersection of the half-spaces out of convex polygons; what is left is convex polygons again.
 void remove_convex(std::vector<PolygonCorners>& polygons, std::span<const HalfSpace> hole);
 

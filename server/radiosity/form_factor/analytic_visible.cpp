@@ -10,14 +10,16 @@ namespace radbake::radiosity {
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-// An occluded patch starts from this many triangles: the two rules must not agree because both saw nothing.
-constexpr std::size_t kFirstTriangles = 128;
+// An occluded patch starts from at least so many triangles: the two rules must not agree because both saw nothing. It
+// is first cut along its events, up to so many: two rules may agree by chance on a triangle with a kink in it.
+constexpr std::size_t kFirstTriangles = 128, kMostTrianglesByEvents = 2048;
 // Lines that leave less than this share of a triangle's size on one side do not cut it.
 constexpr double kSmallestCut = 1e-6;
 // More occluders than this are not paired with each other for events: their lines would be more than the triangles.
 constexpr std::size_t kMostPairedOccluders = 12;
-// The difference of the rules is the error of the lower one; four times it is stated, for kinks that both miss alike.
-constexpr double kSafety = 4;
+// The difference of the rules is the error of the lower one; four times it is stated, for kinks that both miss alike,
+// and more where an event is known to cross.
+constexpr double kSafety = 4, kSafetyAtEvents = 4 * kSafety;
 // Of a mismatch between a triangle and its parts: a smooth integrand's falls by more each time it is cut.
 constexpr double kDoubt = 0.25;
 constexpr double kRoundingOfPoint = 64 * kEpsilon;
@@ -170,7 +172,7 @@ struct Triangle {
 /// The outer integral.
 class OuterIntegral {
  public:
-  OuterIntegral(const Piece& outer, const Piece& inner, std::span<const Piece> occluders)
+  OuterIntegral(const Piece& outer, const Piece& inner, std::span<const Piece> occluders, long most)
       : visible_(outer, inner, occluders), events_(outer, inner, occluders) {
     std::vector<std::uint32_t> all(events_.lines().size());
     for (std::uint32_t k = 0; k < all.size(); ++k) all[k] = k;
@@ -178,7 +180,11 @@ class OuterIntegral {
       add(outer.corners[0], outer.corners[k], outer.corners[k + 1], all);
     }
     if (occluders.empty()) return;
-    // Cut the largest first: its area stands in for an error that is not known yet.
+    const std::size_t most_by_events = std::min(kMostTrianglesByEvents, static_cast<std::size_t>(most) / 64);
+    for (std::size_t k = 0; k < triangles_.size() && triangles_.size() < most_by_events; ++k) {
+      while (!triangles_[k].lines.empty() && triangles_.size() < most_by_events) cut(k);
+    }
+    // Then the largest first: its area stands in for an error that is not known yet.
     while (triangles_.size() < kFirstTriangles) {
       std::size_t largest = 0;
       for (std::size_t k = 1; k < triangles_.size(); ++k) {
@@ -205,7 +211,7 @@ class OuterIntegral {
       count(k, 0);
     }
     // Relative to the value, smaller differences of the rules are their rounding.
-    while (kSafety * error > std::max(tolerance, kRoundingOfPoint * value) && evaluations < most) {
+    while (error > std::max(tolerance, kRoundingOfPoint * value) && evaluations < most) {
       const std::size_t worst = ranked.top().index;
       ranked.pop();
       error -= triangles_[worst].error;
@@ -220,7 +226,8 @@ class OuterIntegral {
         after += triangles_[k].value;
       }
       // Where the parts do not add up to the whole, two rules that agree on a part may both miss a feature.
-      const double doubt = kDoubt * std::abs(after - before) / static_cast<double>(triangles_.size() - first_new + 1);
+      const double doubt =
+          kSafety * kDoubt * std::abs(after - before) / static_cast<double>(triangles_.size() - first_new + 1);
       count(worst, doubt);
       for (std::size_t k = first_new; k < triangles_.size(); ++k) count(k, doubt);
     }
@@ -229,7 +236,7 @@ class OuterIntegral {
     double area = 0;
     for (const Triangle& triangle : triangles_) {
       result.value += triangle.value;
-      result.error += kSafety * triangle.error;
+      result.error += triangle.error;
       area += triangle.area;
     }
     if (result.value > 0) result.error += kRoundingOfPoint * area;
@@ -274,7 +281,8 @@ class OuterIntegral {
       return sum * triangle.area;
     };
     triangle.value = sum_of(dunavant_rule());
-    triangle.error = std::abs(triangle.value - sum_of(radon_rule()));
+    triangle.error =
+        (triangle.lines.empty() ? kSafety : kSafetyAtEvents) * std::abs(triangle.value - sum_of(radon_rule()));
   }
 
   /// Replaces a triangle by its parts: along the event that halves it best, else across its longest edge.
@@ -328,7 +336,7 @@ class OuterIntegral {
 
 Exchange visible_exchange(const Piece& outer, const Piece& inner, std::span<const Piece> occluders, double tolerance,
                           long most) {
-  return OuterIntegral(outer, inner, occluders).integrate(tolerance, most);
+  return OuterIntegral(outer, inner, occluders, most).integrate(tolerance, most);
 }
 
 }  // namespace radbake::radiosity

@@ -7,7 +7,9 @@
 namespace radbake::radiosity {
 namespace {
 
-constexpr int kMostChains = 256;
+// More chains than this, or than leave each so many evaluations, are not counted.
+constexpr std::size_t kMostChains = 256;
+constexpr long kLeastEvaluationsOfChain = 100;
 // How much polygons shrink for general position: a part in 3e10, but at least so much that rounding stays a small part
 // of it. Each by its own multiple, by the golden ratio: equal steps would leave what lies in one plane in one plane.
 constexpr double kShrinkage = 0x1p-35, kShrinkageOverRounding = 0x1p-46;
@@ -22,11 +24,15 @@ double shrinkage_of(const PolygonCorners& corners, std::size_t place) {
 class Chains {
  public:
   Chains(std::span<const Passing> passings, double tolerance, long most)
-      : passings_(passings), tolerance_(tolerance), most_(most) {}
+      : passings_(passings),
+        tolerance_(tolerance),
+        most_(most),
+        most_chains_(std::min(kMostChains, static_cast<std::size_t>(most / kLeastEvaluationsOfChain))) {}
 
   Exchange add_up() {
+    if (passings_.size() > most_chains_) return {0, std::numeric_limits<double>::infinity(), 0};
     for (std::uint32_t k = 0; k < passings_.size(); ++k) extend({}, k);
-    if (chains_.size() > kMostChains) return {0, std::numeric_limits<double>::infinity(), 0};
+    if (chains_.size() > most_chains_) return {0, std::numeric_limits<double>::infinity(), 0};
     Exchange sum;
     for (const Chain& chain : chains_) {
       const Exchange one = exchange_of(chain);
@@ -45,7 +51,7 @@ class Chains {
 
   /// Lets the lines of a chain pass one occluder more, if any can, and goes on from there.
   void extend(const Chain& before, std::uint32_t k) {
-    if (chains_.size() > kMostChains) return;
+    if (chains_.size() > most_chains_) return;
     const Passing& next = passings_[k];
     for (const std::uint32_t j : before.passed) {
       if (passings_[j].item == next.item) return;
@@ -111,6 +117,7 @@ class Chains {
   std::span<const Passing> passings_;
   double tolerance_;
   long most_;
+  std::size_t most_chains_;
   std::vector<Chain> chains_;
 };
 

@@ -16,6 +16,8 @@ constexpr double kContourError = 1e-10, kContourRelativeError = 1e-9;
 constexpr double kUnoccludedError = 1e-12;
 // Of the open value: above it, what is left of a far pair would have no digits, and the visible part is integrated.
 constexpr double kMostHiddenError = 1e-2;
+// So many occluders are looked at from a point in the time of one evaluation.
+constexpr long kOccludersOfEvaluation = 8;
 // How often a piece is cut where there are too many chains of occluders to count.
 constexpr int kMostCuts = 4;
 
@@ -99,7 +101,8 @@ Difference open_less_hidden(const Piece& p, const Piece& q, const Passings& pass
 Difference sum_over_parts(std::span<const PolygonCorners> parts, const Piece& p, const Piece& q,
                           const Passings& passings, const Occluders& occluders, const Effort& effort) {
   const auto num_parts = static_cast<double>(parts.size());
-  const Effort of_part{effort.tolerance / num_parts, effort.most, effort.num_cuts + 1};
+  const Effort of_part{effort.tolerance / num_parts, effort.most / std::max(1L, static_cast<long>(parts.size())),
+                       effort.num_cuts + 1};
   Difference sum;
   for (const PolygonCorners& corners : parts) {
     const Piece part{corners, p.front};
@@ -207,7 +210,9 @@ PairExchange pair_exchange(const Piece& whole_p, const Piece& whole_q, const Occ
     // What is visible has more digits, or is all there is; the difference bounds it.
     std::vector<Piece> pieces;
     for (const std::uint32_t k : passings.in_shaft) pieces.push_back(occluders.pieces()[k]);
-    const Exchange visible = visible_past(p, q, pieces, tolerance, most);
+    // A point costs as much as there are occluders.
+    const long most_points = most / (1 + static_cast<long>(pieces.size()) / kOccludersOfEvaluation);
+    const Exchange visible = visible_past(p, q, pieces, tolerance, most_points);
     const double low = std::max(0.0, result.value - result.error), high = result.value + result.error;
     const double value = std::clamp(visible.value, low, std::max(low, high));
     result.error = std::max(value - low, high - value);

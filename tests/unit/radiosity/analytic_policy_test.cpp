@@ -118,6 +118,27 @@ TEST(PolygonPolicy, NeverLeaksThroughASeamHoweverTheWallIsCut) {
   EXPECT_NEAR(form_factor(kFloor, kCeiling, fan), whole, 2e-6);
 }
 
+TEST(PolygonPolicy, HidesTheOverlapOfOccludersInOnePlaneOnce) {
+  const double whole = form_factor(kFloor, kCeiling, {plate(0, 0.8, 0, 0.9, 0.5)});
+  EXPECT_NEAR(form_factor(kFloor, kCeiling, {plate(0, 0.6, 0, 0.9, 0.5), plate(0.3, 0.8, 0, 0.9, 0.5)}), whole, 2e-6);
+  EXPECT_NEAR(form_factor(kFloor, kCeiling, {plate(0, 0.8, 0, 0.9, 0.5), plate(0, 0.8, 0, 0.9, 0.5)}), whole, 2e-6);
+}
+
+TEST(PolygonPolicy, SeesNothingFromThePartOfAPatchThatIsInABox) {
+  const auto box = [](double low, double high) {
+    const Vec3 o{0.2, 0.3, low}, x{0.4, 0, 0}, y{0, 0.5, 0}, z{0, 0, high - low};
+    const auto face = [](Vec3 a, Vec3 s, Vec3 t) { return PolygonCorners{a, a + s, a + s + t, a + t}; };
+    return std::vector<PolygonCorners>{face(o, y, x),     face(o + z, x, y), face(o, z, y),
+                                       face(o + x, y, z), face(o, x, z),     face(o + y, z, x)};
+  };
+  const double standing = form_factor(kFloor, kCeiling, box(0, 0.4));
+  EXPECT_NEAR(form_factor(kFloor, kCeiling, box(-0.3, 0.4)), standing, 2e-6);
+  EXPECT_NEAR(form_factor(kCeiling, kFloor, box(-0.3, 0.4)), standing, 2e-6);
+  EXPECT_LT(standing, 0.8 * form_factor(kFloor, kCeiling));
+  // All of the patch in the box: nothing leaves it.
+  EXPECT_EQ(form_factor(plate(0.3, 0.5, 0.4, 0.7, 0), kCeiling, box(-0.3, 0.4)), 0);
+}
+
 TEST(PolygonPolicy, TakesAnOccluderThatIsNotConvex) {
   const PolygonCorners angle = {{0, 0, 0.4},     {0.8, 0, 0.4},   {0.8, 0.3, 0.4},
                                 {0.3, 0.3, 0.4}, {0.3, 0.9, 0.4}, {0, 0.9, 0.4}};

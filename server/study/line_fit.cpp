@@ -12,8 +12,8 @@ double student_95(int degrees) {
   if (degrees == 1) return 12.706;
   if (degrees == 2) return 4.3027;
   if (degrees == 3) return 3.1824;
-  constexpr double x = 1.959964;  // of the normal distribution
-  constexpr double x3 = x * x * x, x5 = x3 * x * x, x7 = x5 * x * x;
+  const double x = 1.959964;  // of the normal distribution
+  const double x3 = x * x * x, x5 = x3 * x * x, x7 = x5 * x * x;
   const double n = degrees;
   return x + (x3 + x) / (4 * n) + (5 * x5 + 16 * x3 + 3 * x) / (96 * n * n) +
          (3 * x7 + 19 * x5 + 17 * x3 - 15 * x) / (384 * n * n * n);

@@ -71,7 +71,7 @@ double rms_error(int replicates, const std::function<double(std::uint64_t)>& err
 
 class RateMeter {
  public:
-  RateMeter(const RateLimits& limits) : limits_(limits), points_(limits.max_rays) {
+  explicit RateMeter(const RateLimits& limits) : limits_(limits), points_(limits.max_rays) {
     for (int r = 4; r <= std::max(limits.max_resolution, limits.max_resolution_of_pair); r *= 2) {
       hemicubes_.emplace_back(r);
     }

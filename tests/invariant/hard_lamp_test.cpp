@@ -134,7 +134,8 @@ TEST_P(CubeWithLamp, IsLitAsTheClosedFormsSayWithinThreeStandardErrors) {
   record_figure("texel_standard_error", off.pooled_standard_error);
   // Texels share the noise of the level of light, above all at a high reflectance: its part is as in the mean.
   EXPECT_LE(off.share_above_3, 0.05);
-  EXPECT_LE(off.largest_pooled, 6);
+  // Beside the lamp's edge errors are several times those of the mean texel; a wrong form factor gives 25 and more.
+  EXPECT_LE(off.largest_pooled, 10);
 }
 
 }  // namespace

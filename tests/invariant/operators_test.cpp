@@ -72,6 +72,35 @@ TEST(EveryOperator, KeepsAFurnaceOfReflectance09999ToAMillionth) {
   }
 }
 
+/// A room with a double-sided box on its floor: under it, and inside, there is no light.
+Scene room_with_a_sealed_box() {
+  RoomBuilder builder(4);
+  const int grey = builder.add_material("grey", {0.6, 0.6, 0.6});
+  const int box = builder.add_material("box", {0.6, 0.6, 0.6}, {}, true);
+  const int lamp = builder.add_material("lamp", {0.5, 0.5, 0.5}, {40, 40, 40});
+  builder.add_box("room", {0, 0, 0}, {4, 3, 4}, grey, true);
+  builder.add_box("box", {1, 0, 1}, {2.5, 1, 2.5}, box, false);
+  builder.add_quad("lamp", {2.5, 2.9, 1}, {0.5, 0, 0}, {0, 0, 0.5}, lamp);
+  return builder.scene();
+}
+
+// The formula finds form factors of 1e-17 where rays find none, and light of 1e-36 is not light: what no light enters
+// is filled from its neighbours with any estimator.
+TEST(EveryEstimator, FindsNoLightInWhatIsSealed) {
+  const Scene scene = room_with_a_sealed_box();
+  // What is left dark are charts that are sealed as a whole: they have no neighbours.
+  const auto num_dark = [&](FormFactors estimator) {
+    const BakeOutcome outcome = baked(scene, small_bake(estimator, Transport::kSparse));
+    const double dark = 0.02 * mean_of(outcome);
+    int count = 0;
+    for_each_covered_texel(outcome.layers.at(0), [&](int, int, Vec3 h) { count += max_component(h) < dark; });
+    return count;
+  };
+  const int expected = num_dark(FormFactors::kHemisphere);
+  for (const FormFactors estimator : kEstimators)
+    EXPECT_EQ(num_dark(estimator), expected) << form_factors_name(estimator);
+}
+
 TEST(DenseOperator, BakesTheBytesOfTheSparseOne) {
   for (const FormFactors estimator : kEstimators) {
     const Scene scene = small_emitter_room(0.8);

@@ -65,7 +65,8 @@ class Bake {
 
     const HemisphereEstimator estimator(surfaces_, prepared_.patches, visibility, prepared_.plan.rays_per_texel);
     const DirectLight receiver_direct(surfaces_, visibility, kLightSamplesPerTexel);
-    const GatherScene scene{surfaces_, visibility, estimator, receiver_direct, radiosity, scene_.sky, options_.seed};
+    const GatherScene scene{surfaces_, visibility, estimator,     receiver_direct,
+                            radiosity, scene_.sky, options_.seed, outcome_.report.solver.error_bound};
     if (!gather(scene)) return cancelled();
     outcome_.report.stages = progress_.stage_times();
     return std::move(outcome_);

@@ -31,8 +31,8 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   const auto max_patches = static_cast<std::size_t>(max_patches_of(options));
   const double reached_density = prepared->atlas ? prepared->atlas->texels_per_meter() : density;
   const double texel_edge = 1 / (reached_density * surfaces.metres_per_unit);
-  prepared->visibility = make_embree_visibility(surfaces.corners);
-  if (stop.stop_requested()) return cancelled;
+  prepared->visibility = make_embree_visibility(surfaces.corners, stop);
+  if (!prepared->visibility || stop.stop_requested()) return cancelled;
   prepared->patches =
       make_patches(surfaces, *prepared->visibility, {patch_edge(texel_edge, area, max_patches), max_patches});
   if (stop.stop_requested()) return cancelled;

@@ -1,8 +1,6 @@
 #include "server/radiosity/form_factor/hemisphere.h"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <array>
 
 namespace radbake::radiosity {
 namespace {
@@ -10,19 +8,6 @@ namespace {
 /// Sites that share a texel's or patch's rays at most; each then has at least eight rays to tell whether it is buried.
 constexpr int kMaxSites = 64;
 constexpr int kRaysPerSite = 8;
-
-/// Direction of the cosine distribution about +z for a point of the unit square. Concentric, so strata stay compact.
-Vec3 cosine_direction(double x, double y) {
-  const double a = 2 * x - 1, b = 2 * y - 1;
-  if (a == 0 && b == 0) return {0, 0, 1};
-  double radius = a, angle = std::numbers::pi / 4 * (b / a);
-  if (std::fabs(a) <= std::fabs(b)) {
-    radius = b;
-    angle = std::numbers::pi / 2 - std::numbers::pi / 4 * (a / b);
-  }
-  const float phi = static_cast<float>(angle);
-  return {radius * std::cos(phi), radius * std::sin(phi), std::sqrt(std::max(0.0, 1 - radius * radius))};
-}
 
 }  // namespace
 
@@ -32,76 +17,81 @@ int HemisphereEstimator::num_sites() const {
   return sites;
 }
 
-void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch,
-                                     RowSample& row) const {
-  row = {std::move(row.arrivals), 0, 0, 0, 0, std::move(row.is_buried), std::move(row.of_site), 1};
-  row.arrivals.clear();
-  row.is_buried.assign(sites.size(), 0);
-  row.of_site.assign(sites.size(), {});
-  scratch.rays.clear();
-  scratch.site_of_ray.clear();
-
-  // Deal the rays to the sites in runs of the sequence.
-  const auto seeds = SobolPoints::seeds_of(seed);
+void HemisphereEstimator::deal_rays(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch) const {
+  directions_.fill(seed, scratch.directions);
   const auto num_rays = static_cast<std::size_t>(rays());
+  scratch.rays.resize(num_rays);
+  scratch.end_of_site.clear();
+  const float *x = scratch.directions.x.data(), *y = scratch.directions.y.data(), *z = scratch.directions.z.data();
+  Ray* ray = scratch.rays.data();
   for (std::size_t s = 0; s < sites.size(); ++s) {
     const Site& site = sites[s];
     const Frame frame(site.normal);
     const auto origin = lifted_origin(surfaces_, site.position, site.facing, site.point.triangle);
+    const auto in_float = [](Vec3 v) {
+      return std::array<float, 3>{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+    };
+    const auto along_x = in_float(frame.s), along_y = in_float(frame.t), along_z = in_float(frame.n);
+    const auto facing = in_float(site.facing);
     const std::size_t end = (s + 1) * num_rays / sites.size();
     for (std::size_t k = s * num_rays / sites.size(); k < end; ++k) {
-      const int i = static_cast<int>(k);
-      const Vec3 direction =
-          frame.to_world(cosine_direction(points_.coordinate(i, 0, seeds), points_.coordinate(i, 1, seeds)));
-      if (dot(direction, site.facing) <= 0) continue;
-      scratch.rays.push_back(
-          {origin,
-           {static_cast<float>(direction.x), static_cast<float>(direction.y), static_cast<float>(direction.z)}});
-      scratch.site_of_ray.push_back(static_cast<std::uint32_t>(s));
+      ray->origin = origin;
+      for (int axis = 0; axis < 3; ++axis) {
+        ray->direction[axis] = along_x[axis] * x[k] + along_y[axis] * y[k] + along_z[axis] * z[k];
+      }
+      // What leaves below the surface is written over.
+      const auto& d = ray->direction;
+      ray += d[0] * facing[0] + d[1] * facing[1] + d[2] * facing[2] > 0;
     }
+    scratch.end_of_site.push_back(static_cast<std::size_t>(ray - scratch.rays.data()));
   }
+  scratch.rays.resize(scratch.end_of_site.back());
+}
+
+void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch,
+                                     RowSample& row) const {
+  row = {std::move(row.arrivals), 0, 0, 0, 0, std::move(row.is_buried), std::move(row.of_site), 1};
+  row.is_buried.assign(sites.size(), 0);
+  row.of_site.assign(sites.size(), {});
+  deal_rays(sites, seed, scratch);
   scratch.hits.resize(scratch.rays.size());
   visibility_.trace(scratch.rays, scratch.hits);
   row.traced = static_cast<std::uint32_t>(scratch.rays.size());
 
   // Read off what each ray met, site by site: a buried site takes its rays back.
-  std::size_t num_buried = 0;
-  for (std::size_t first = 0; first < scratch.rays.size();) {
-    const std::uint32_t s = scratch.site_of_ray[first];
+  row.arrivals.resize(scratch.rays.size());
+  std::uint32_t num_arrivals = 0;
+  std::size_t num_buried = 0, k = 0;
+  for (std::size_t s = 0; s < sites.size(); ++s) {
     RowSample::SiteRays own;
-    own.first_arrival = static_cast<std::uint32_t>(row.arrivals.size());
+    own.first_arrival = num_arrivals;
+    own.counted = static_cast<std::uint32_t>(scratch.end_of_site[s] - k);
     std::uint32_t absorbed = 0;
-    std::size_t k = first;
-    for (; k < scratch.rays.size() && scratch.site_of_ray[k] == s; ++k) {
+    for (; k < scratch.end_of_site[s]; ++k) {
       const Hit& hit = scratch.hits[k];
       if (hit.triangle == kNoHit) {
         ++own.escaped;
         continue;
       }
-      const auto& d = scratch.rays[k].direction;
-      const Vec3 direction{d[0], d[1], d[2]};
-      own.backs += dot(surfaces_.normals[hit.triangle], direction) > 0;
-      const std::uint32_t patch = patches_.met_by(hit, direction, surfaces_);
-      if (patch == kNoPatch) {
-        ++absorbed;
-      } else {
-        row.arrivals.push_back(patch);
-      }
+      const Patches::Meeting met = patches_.meet(hit, scratch.rays[k].direction, surfaces_);
+      own.backs += met.is_back;
+      absorbed += met.patch == kNoPatch;
+      row.arrivals[num_arrivals] = met.patch;
+      num_arrivals += met.patch != kNoPatch;
     }
-    if (2 * std::size_t{absorbed} > k - first) {
+    if (2 * absorbed > own.counted) {
       row.is_buried[s] = 1;
       ++num_buried;
-      row.arrivals.resize(own.first_arrival);
-    } else {
-      own.num_arrivals = static_cast<std::uint32_t>(row.arrivals.size()) - own.first_arrival;
-      own.counted = static_cast<std::uint32_t>(k - first);
-      row.of_site[s] = own;
-      row.escaped += own.escaped;
-      row.absorbed += absorbed;
-      row.counted += own.counted;
+      num_arrivals = own.first_arrival;
+      continue;
     }
-    first = k;
+    own.num_arrivals = num_arrivals - own.first_arrival;
+    row.of_site[s] = own;
+    row.escaped += own.escaped;
+    row.absorbed += absorbed;
+    row.counted += own.counted;
   }
+  row.arrivals.resize(num_arrivals);
   row.visible_share = 1 - static_cast<double>(num_buried) / static_cast<double>(sites.size());
 }
 

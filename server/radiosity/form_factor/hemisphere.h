@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/sequence.h"
+#include "server/radiosity/form_factor/cosine_directions.h"
 #include "server/radiosity/patches/patches.h"
 #include "server/radiosity/survey/site.h"
 #include "server/radiosity/visibility/visibility.h"
@@ -34,36 +34,39 @@ struct RowSample {
 ///
 ///   F_ij = 1/A_i int_i int_hemisphere cos(theta)/pi V_j(x, omega) d omega dA
 ///
-/// The rays of one row are an Owen-scrambled Sobol sequence over the hemisphere, dealt to the sites in runs. Hits,
+/// The rays of one row are a scrambled Sobol sequence over the hemisphere, dealt to the sites in runs. Hits,
 /// escapes and absorptions sum to the rays counted by construction. A site is *buried* when more than half of its rays
 /// meet the back of single-sided surfaces: it lies inside other geometry, and its rays do not count. Rays about an
 /// interpolated normal that leave below the surface are rejected and do not count either.
 /// Errors: variance of F_ij is at most F (1 - F) / rays.
-/// Source: Malley's method, Shirley & Chiu 1997 (disk map); Owen 1995.
+/// Source: Malley's method; the directions are those of CosineDirections.
 class HemisphereEstimator {
  public:
   HemisphereEstimator(const Surfaces& surfaces, const Patches& patches, const Visibility& visibility, int rays)
-      : surfaces_(surfaces), patches_(patches), visibility_(visibility), points_(rays) {}
+      : surfaces_(surfaces), patches_(patches), visibility_(visibility), directions_(rays) {}
 
-  int rays() const { return points_.size(); }
+  int rays() const { return directions_.size(); }
   /// How many sites a receiver should have for this number of rays.
   int num_sites() const;
 
   /// Buffers that one thread reuses from row to row.
   struct Scratch {
+    CosineDirections::Row directions;
     std::vector<Ray> rays;
     std::vector<Hit> hits;
-    std::vector<std::uint32_t> site_of_ray;
+    std::vector<std::size_t> end_of_site;  ///< into rays
   };
 
   /// Traces one row. Shapes: sites [n], n >= 1.
   void sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, RowSample& row) const;
 
  private:
+  void deal_rays(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch) const;
+
   const Surfaces& surfaces_;
   const Patches& patches_;
   const Visibility& visibility_;
-  SobolPoints points_;
+  CosineDirections directions_;
 };
 
 }  // namespace radbake::radiosity

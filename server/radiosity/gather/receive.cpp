@@ -19,7 +19,7 @@ bool looks_sealed(const GatherScene& scene, const RowSample& row, std::size_t si
   const RowSample::SiteRays& own = row.of_site[site];
   if (own.escaped > 0 || 2 * own.backs <= own.counted) return false;
   for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
-    if (!(scene.radiosity[row.arrivals[own.first_arrival + k]] == Vec3{})) return false;
+    if (max_component(scene.radiosity[row.arrivals[own.first_arrival + k]]) > scene.dark) return false;
   }
   return true;
 }

@@ -19,6 +19,7 @@ struct GatherScene {
   std::span<const Vec3> radiosity;  ///< [patches] B'
   Vec3 sky;                         ///< luminance, nit
   std::uint64_t seed = 0;
+  double dark = 0;  ///< radiosity up to this is none: what the solver cannot tell from 0, lx
 };
 
 /// Light that arrives at one receiver.

@@ -239,6 +239,7 @@ class PatchBuilder {
       result_.cell_of_back_.push_back(c);
       result_.areas_.push_back(result_.areas_[c]);
     }
+    result_.make_quick_maps(surfaces_);
   }
 
   const Surfaces& surfaces_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace radbake::radiosity {
 
@@ -32,12 +33,66 @@ std::uint32_t Patches::find(std::uint32_t triangle, double u, double v, bool is_
   return is_back ? back_of_cell_[front] : front;
 }
 
+namespace {
+
+// A ray is followed back to a few times the height of ray origins, but not far where it grazes.
+constexpr double kHeights = 4;
+constexpr double kLeastCosine = 1.0 / 256;
+
+}  // namespace
+
+void Patches::make_quick_maps(const Surfaces& surfaces) {
+  constexpr std::int32_t kMostCells = 1 << 12;  // grid coordinates keep 11 bits below 1 in single precision
+  quick_maps_.resize(maps_.size());
+  for (std::size_t t = 0; t < maps_.size(); ++t) {
+    const GridMap& map = maps_[t];
+    const Grid& grid = grids_[group_of_[t]];
+    QuickMap& quick = quick_maps_[t];
+    for (int axis = 0; axis < 3; ++axis) quick.normal[axis] = static_cast<float>(surfaces.normals[t][axis]);
+    double steepest = 0;
+    for (int axis = 0; axis < 2; ++axis) {
+      quick.origin[axis] = static_cast<float>(map.origin[axis]);
+      quick.per_u[axis] = static_cast<float>(map.per_u[axis]);
+      quick.per_v[axis] = static_cast<float>(map.per_v[axis]);
+      quick.cells[axis] = grid.cells[axis];
+      steepest = std::max(steepest, length(weights_[t][0] * map.per_u[axis] + weights_[t][1] * map.per_v[axis]));
+    }
+    const bool is_flat = grid.cells[2] == 1 && grid.cells[0] <= kMostCells && grid.cells[1] <= kMostCells;
+    const bool fits = grid.is_dense && grid.dense_at <= 0xffffffffu;
+    quick.dense_at = static_cast<std::uint32_t>(grid.dense_at);
+    quick.shift = is_flat && fits ? static_cast<float>(kHeights * surfaces.ray_offsets[t] * steepest)
+                                  : std::numeric_limits<float>::infinity();
+  }
+}
+
+Patches::Meeting Patches::meet(const Hit& hit, const std::array<float, 3>& direction, const Surfaces& surfaces) const {
+  const QuickMap& quick = quick_maps_[hit.triangle];
+  const float cosine = direction[0] * quick.normal[0] + direction[1] * quick.normal[1] + direction[2] * quick.normal[2];
+  // Where neither the way back nor rounding can reach the border of a cell, and no contact cuts it, this is its patch.
+  constexpr float kBorder = 0x1p-8f;
+  const float slack = std::fabs(cosine) * kBorder;
+  const float x = quick.origin[0] + quick.per_u[0] * hit.u + quick.per_v[0] * hit.v;
+  const float y = quick.origin[1] + quick.per_u[1] * hit.u + quick.per_v[1] * hit.v;
+  if (quick.shift <= slack && std::fabs(cosine) > static_cast<float>(kLeastCosine) && x > 0 && y > 0) {
+    const auto column = static_cast<std::int32_t>(x), row = static_cast<std::int32_t>(y);
+    const float across = x - static_cast<float>(column), down = y - static_cast<float>(row);
+    const bool is_inside = across > 2 * kBorder && across < 1 - 2 * kBorder && down > 2 * kBorder &&
+                           down < 1 - 2 * kBorder && column < quick.cells[0] && row < quick.cells[1];
+    if (is_inside) {
+      const std::uint32_t cell = dense_[quick.dense_at + static_cast<std::uint32_t>(row * quick.cells[0] + column)];
+      if (cell != kNoPatch && first_part_[cell + 1] - first_part_[cell] == 1) {
+        const std::uint32_t front = first_part_[cell];
+        return {cosine > 0 ? back_of_cell_[front] : front, cosine > 0};
+      }
+    }
+  }
+  const Vec3 exactly{direction[0], direction[1], direction[2]};
+  return {met_by(hit, exactly, surfaces), dot(exactly, surfaces.normals[hit.triangle]) > 0};
+}
+
 std::uint32_t Patches::met_by(const Hit& hit, Vec3 direction, const Surfaces& surfaces) const {
   const double cosine = dot(direction, surfaces.normals[hit.triangle]);
   const bool is_back = cosine > 0;
-  // Go back along the ray, to a few times the height of ray origins, but not far where it grazes.
-  constexpr double kHeights = 4;
-  constexpr double kLeastCosine = 1.0 / 256;
   const Vec3 back =
       direction * (-kHeights * surfaces.ray_offsets[hit.triangle] / std::max(std::fabs(cosine), kLeastCosine));
   const double u = hit.u + dot(weights_[hit.triangle][0], back), v = hit.v + dot(weights_[hit.triangle][1], back);

@@ -67,6 +67,13 @@ class Patches {
   /// wall that stands there, and then its hit lies on the wrong side of the contact by as much.
   std::uint32_t met_by(const Hit& hit, Vec3 direction, const Surfaces& surfaces) const;
 
+  /// met_by(), and whether the ray met a back: the same answer, sooner where no contact or border of a patch is near.
+  struct Meeting {
+    std::uint32_t patch;
+    bool is_back;
+  };
+  Meeting meet(const Hit& hit, const std::array<float, 3>& direction, const Surfaces& surfaces) const;
+
   /// A point of the patch, uniform by area for uniform (x, y) in the unit square; continuous within a piece.
   SurfacePoint sample(std::uint32_t patch, double x, double y) const;
 
@@ -104,6 +111,16 @@ class Patches {
     bool is_beyond(Vec3 grid) const { return normal.x * grid.x + normal.y * grid.y > offset; }
   };
 
+  /// What meet() reads of a triangle, in one line of the cache.
+  struct alignas(64) QuickMap {
+    std::array<float, 3> normal;
+    std::array<float, 2> origin, per_u, per_v;  ///< of grid coordinates
+    float shift = 0;  ///< how far along the grid met_by() may go back for a ray along the normal; infinite: ask it
+    std::array<std::int32_t, 2> cells;
+    std::uint32_t dense_at = 0;
+  };
+  void make_quick_maps(const Surfaces& surfaces);
+
   std::uint32_t part_at(std::uint32_t cell, Vec3 grid) const;
   /// The cell of a triangle at a place of its grid, or kNoPatch.
   std::uint32_t cell_of(std::uint32_t triangle, Vec3 grid) const;
@@ -130,6 +147,7 @@ class Patches {
   std::vector<std::array<Vec3, 2>> weights_;  ///< [triangles] gradients of u and v over space
   std::vector<std::uint32_t> some_cell_;      ///< [triangles] a cell of it, for hits that round out of all
   std::vector<Grid> grids_;                   ///< [groups]
+  std::vector<QuickMap> quick_maps_;          ///< [triangles]
   std::vector<std::uint32_t> dense_;
   std::unordered_map<SparseCell, std::uint32_t, SparseCellHash> sparse_;
 };

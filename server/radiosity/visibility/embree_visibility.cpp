@@ -15,6 +15,18 @@ constexpr double kRounding = 0x1p-20;
 /// Along the axis of a shaft; a longer one has longer spheres.
 constexpr int kMostSpheres = 8;
 
+/// What is the same for all rays, in all lanes: Embree leaves it as it is.
+template <typename Packet>
+void set_constants(Packet& packet) {
+  for (int k = 0; k < kPacket; ++k) {
+    packet.tnear[k] = 0;
+    packet.time[k] = 0;
+    packet.mask[k] = 0xffffffffu;
+    packet.id[k] = static_cast<unsigned>(k);
+    packet.flags[k] = 0;
+  }
+}
+
 /// Fills lane k of a packet; lanes without a ray are switched off by `valid`.
 template <typename Packet>
 void set_lane(Packet& packet, int k, const Ray& ray) {
@@ -24,17 +36,12 @@ void set_lane(Packet& packet, int k, const Ray& ray) {
   packet.dir_x[k] = ray.direction[0];
   packet.dir_y[k] = ray.direction[1];
   packet.dir_z[k] = ray.direction[2];
-  packet.tnear[k] = 0;
   packet.tfar[k] = ray.max_distance;
-  packet.time[k] = 0;
-  packet.mask[k] = 0xffffffffu;
-  packet.id[k] = static_cast<unsigned>(k);
-  packet.flags[k] = 0;
 }
 
 class EmbreeVisibility final : public Visibility {
  public:
-  explicit EmbreeVisibility(std::span<const Corners> triangles) {
+  EmbreeVisibility(std::span<const Corners> triangles, const std::stop_token& stop) {
     device_ = rtcNewDevice(nullptr);
     RADBAKE_CHECK(device_ != nullptr);
     scene_ = rtcNewScene(device_);
@@ -58,9 +65,18 @@ class EmbreeVisibility final : public Visibility {
     // Build on one thread: ties between coplanar triangles are decided by the tree's order, and a tree that was built
     // by several threads may order its leaves by chance. Not rtcJoinCommitScene(): that works in an arena of its own.
     tbb::task_arena one_thread(1);
+    const auto goes_on = [](void* token, double) {
+      return !static_cast<const std::stop_token*>(token)->stop_requested();
+    };
+    rtcSetSceneProgressMonitorFunction(scene_, goes_on, const_cast<std::stop_token*>(&stop));
     one_thread.execute([this] { rtcCommitScene(scene_); });
-    RADBAKE_CHECK(rtcGetDeviceError(device_) == RTC_ERROR_NONE);
+    rtcSetSceneProgressMonitorFunction(scene_, nullptr, nullptr);
+    const RTCError error = rtcGetDeviceError(device_);
+    is_built_ = error != RTC_ERROR_CANCELLED;
+    RADBAKE_CHECK(!is_built_ || error == RTC_ERROR_NONE);
   }
+
+  bool is_built() const { return is_built_; }
 
   ~EmbreeVisibility() override {
     rtcReleaseScene(scene_);
@@ -75,6 +91,7 @@ class EmbreeVisibility final : public Visibility {
     rtcInitIntersectContext(&context);
     alignas(64) int valid[kPacket];
     RTCRayHit16 packet;
+    set_constants(packet.ray);
     for (std::size_t first = 0; first < rays.size(); first += kPacket) {
       const int count = static_cast<int>(std::min<std::size_t>(kPacket, rays.size() - first));
       for (int k = 0; k < kPacket; ++k) {
@@ -97,6 +114,7 @@ class EmbreeVisibility final : public Visibility {
     rtcInitIntersectContext(&context);
     alignas(64) int valid[kPacket];
     RTCRay16 packet;
+    set_constants(packet);
     for (std::size_t first = 0; first < segments.size(); first += kPacket) {
       const int count = static_cast<int>(std::min<std::size_t>(kPacket, segments.size() - first));
       for (int k = 0; k < kPacket; ++k) {
@@ -180,12 +198,15 @@ class EmbreeVisibility final : public Visibility {
   const float* vertices_ = nullptr;  ///< [9 x triangles], of the geometry
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
+  bool is_built_ = false;
 };
 
 }  // namespace
 
-std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles) {
-  return std::make_unique<EmbreeVisibility>(triangles);
+std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop) {
+  auto visibility = std::make_unique<EmbreeVisibility>(triangles, stop);
+  if (!visibility->is_built()) return nullptr;
+  return visibility;
 }
 
 }  // namespace radbake::radiosity

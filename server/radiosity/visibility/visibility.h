@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -74,8 +75,8 @@ class Visibility {
 using Corners = std::array<Vec3, 3>;
 
 /// Embree's tree over triangles, watertight at shared edges. Corners should lie within a few units of 0: they are
-/// stored in float.
-std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles);
+/// stored in float. Null where `stop` was requested while the tree was built.
+std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop = {});
 
 /// The slow twin for tests: every ray against every triangle, in double (Moeller & Trumbore 1997).
 std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles);

@@ -79,5 +79,53 @@ TEST(HemisphereRow, IsTheSameForTheSameSeedAndAnotherForAnother) {
   EXPECT_NE(cube.row(2, 256, 7), cube.row(2, 256, 8));
 }
 
+TEST(CosineDirections, AreOfUnitLengthAndOfTheCosineDistribution) {
+  for (const int n : {8, 256, 4096}) {
+    const CosineDirections directions(n);
+    CosineDirections::Row row;
+    constexpr int kRows = 4000;
+    double x = 0, y = 0, z = 0, xy = 0, z_squared = 0, error = 0;
+    for (int seed = 0; seed < kRows; ++seed) {
+      directions.fill(static_cast<std::uint64_t>(seed), row);
+      ASSERT_EQ(row.x.size(), static_cast<std::size_t>(n));
+      for (int k = 0; k < n; ++k) {
+        const double a = row.x[k], b = row.y[k], c = row.z[k];
+        error = std::max(error, std::fabs(a * a + b * b + c * c - 1));
+        x += a, y += b, z += c, xy += a * b, z_squared += c * c;
+      }
+    }
+    constexpr double kSinglePrecision = 1e-6;
+    EXPECT_LE(error, kSinglePrecision);
+    // E x = E y = E xy = 0, E z = 2/3, E z^2 = 1/2. Four standard errors of independent directions, which rows of a
+    // net are well below; half of it for z, whose variance is 1/18.
+    const double num = static_cast<double>(kRows) * n, tolerance = 4 * std::sqrt(0.25 / num);
+    EXPECT_NEAR(x / num, 0, tolerance);
+    EXPECT_NEAR(y / num, 0, tolerance);
+    EXPECT_NEAR(xy / num, 0, tolerance);
+    EXPECT_NEAR(z / num, 2.0 / 3, tolerance / 2);
+    EXPECT_NEAR(z_squared / num, 0.5, tolerance);
+  }
+}
+
+// Runs of 16 are nets: each of 16 equal parts of the hemisphere, seen from above as a ring or a wedge, has one. By z^2,
+// which is uniform: one direction in each sixteenth of the square's larger coordinate's square is more than rays by
+// chance would give, so the spread of the mean of z^2 over 16 is far below that of 16 independent ones.
+TEST(CosineDirections, AreSpreadEvenlyWithinRuns) {
+  const CosineDirections directions(256);
+  CosineDirections::Row row;
+  double square = 0;
+  int runs = 0;
+  for (int seed = 0; seed < 500; ++seed) {
+    directions.fill(static_cast<std::uint64_t>(seed), row);
+    for (int first = 0; first < 256; first += 16, ++runs) {
+      double sum = 0;
+      for (int k = first; k < first + 16; ++k) sum += row.z[k] * row.z[k] - 0.5;
+      square += sum / 16 * (sum / 16);
+    }
+  }
+  const double independent = 1.0 / 12 / 16;
+  EXPECT_LE(square / runs, independent / 5);
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

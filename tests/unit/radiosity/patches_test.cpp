@@ -166,5 +166,38 @@ TEST(Patches, OfAHillySurfaceAreNotCutWhereItsGroupsMeet) {
   for (std::uint32_t i = 0; i < cut.patches.size(); ++i) EXPECT_GT(cut.patches.area(i), 0);
 }
 
+// The quick look-up is the exact one wherever it dares to answer: at contacts, borders of patches, grazing rays, backs.
+TEST(Patches, AreFoundQuicklyAsTheyAreFoundExactly) {
+  for (const bool is_double_sided : {false, true}) {
+    tests::RoomBuilder builder(4);
+    const int grey = builder.add_material("grey", {0.5, 0.5, 0.5}, {1, 1, 1}, is_double_sided);
+    builder.add_box("room", {0, 0, 0}, {4, 3, 5}, grey, true);
+    builder.add_box("block", {1.03, 0, 1.51}, {2.2, 1.3, 2.7}, grey, false);
+    const auto checked = survey_scene(builder.scene());
+    ASSERT_TRUE(checked.ok()) << checked.error().message;
+    const Cut cut(builder.scene(), 0.25, 10000);
+    const Surfaces& surfaces = cut.surveyed.surfaces;
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<float> any(-1, 1), weight(0, 1);
+    int differences = 0;
+    for (int k = 0; k < 200'000; ++k) {
+      Hit hit{static_cast<std::uint32_t>(random() % surfaces.corners.size()), weight(random), weight(random)};
+      if (hit.u + hit.v > 1) hit.u = 1 - hit.u, hit.v = 1 - hit.v;
+      Vec3 direction{any(random), any(random), any(random)};
+      if (k % 3 == 0)
+        direction =
+            direction - surfaces.normals[hit.triangle] * dot(direction, surfaces.normals[hit.triangle]) * (1 - 1e-3);
+      direction = normalized(direction);
+      const std::array<float, 3> rounded{static_cast<float>(direction.x), static_cast<float>(direction.y),
+                                         static_cast<float>(direction.z)};
+      const Vec3 exactly{rounded[0], rounded[1], rounded[2]};
+      const Patches::Meeting met = cut.patches.meet(hit, rounded, surfaces);
+      differences += met.patch != cut.patches.met_by(hit, exactly, surfaces);
+      differences += met.is_back != (dot(exactly, surfaces.normals[hit.triangle]) > 0);
+    }
+    EXPECT_EQ(differences, 0);
+  }
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

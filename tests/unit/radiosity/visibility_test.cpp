@@ -162,5 +162,14 @@ TEST(Visibility, LetsNoRayEscapeBetweenTrianglesOfAClosedBox) {
   for (const Hit& hit : hits) EXPECT_NE(hit.triangle, kNoHit);
 }
 
+TEST(EmbreeVisibility, IsNotBuiltWhenItIsCancelled) {
+  const std::vector<Corners> triangles = random_triangles(100'000, 3);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(make_embree_visibility(triangles, stop.get_token()), nullptr);
+  // What was cancelled leaves nothing behind for the next one.
+  EXPECT_NE(make_embree_visibility(triangles), nullptr);
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

@@ -138,7 +138,8 @@ class Crossing {
       error += intervals_[k].error;
       if (intervals_[k].error > 0) ranked.push({intervals_[k].error, k});
     }
-    while (error > wanted && !ranked.empty() && evaluations_ < most) {
+    const long end = evaluations_ + most;
+    while (error > wanted && !ranked.empty() && evaluations_ < end) {
       const std::size_t worst = ranked.top().index;
       ranked.pop();
       Interval first = intervals_[worst], second = first;
@@ -233,7 +234,15 @@ class Crossing {
   void add_intervals(const Bounded& bounded) {
     find_cuts(conditions_of(bounded), cuts_);
     for (std::size_t k = 0; k + 1 < cuts_.size(); ++k) {
-      if (cuts_[k] < cuts_[k + 1]) intervals_.push_back({pairs_.size(), cuts_[k], cuts_[k + 1]});
+      const double begin = cuts_[k], width = cuts_[k + 1] - begin;
+      // Where no line counts at one point between two cuts, none does at others.
+      const auto is_empty_at = [&](double share) {
+        ++evaluations_;
+        return bounded.pair.at(begin + width * share, conditions_of(bounded)) == 0;
+      };
+      if (width > 0 && !(is_empty_at(0.5) && is_empty_at(0.2))) {
+        intervals_.push_back({pairs_.size(), begin, cuts_[k + 1]});
+      }
     }
     pairs_.push_back(bounded);
   }

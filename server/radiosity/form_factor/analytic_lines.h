@@ -21,7 +21,8 @@ namespace radbake::radiosity {
 /// Shapes: chain [n], n >= 2, in the order in which the lines meet them, each counter-clockwise about the lines.
 /// Units:  tolerance in those of A F.
 /// Errors: precondition: general position. Where three edges of different polygons lie in one plane, rounding decides
-///         which lines count: see shrunk(). The error is above the tolerance after `most` evaluations.
+///         which lines count: see shrunk(). The error is above the tolerance after `most` evaluations beyond the first
+///         of each interval.
 /// Source: Santalo 1976 (measure of lines); for two polygons it is Schroeder & Hanrahan 1993 (eq. 3), by parts.
 Exchange crossing_exchange(std::span<const PolygonCorners> chain, double tolerance, long most);
 

@@ -127,7 +127,7 @@ Exchange by_visible_part(const Scenery& scenery, double tolerance) {
   clip_convex(from.corners, to.front, p.corners);
   clip_convex(to.corners, from.front, q.corners);
   if (p.corners.empty() || q.corners.empty()) return {};
-  Exchange exchange = visible_exchange(p, q, occluders, tolerance * polygon_area(from.corners), 100'000);
+  Exchange exchange = visible_exchange(p, q, occluders, tolerance * polygon_area(from.corners), 60'000);
   exchange.value /= polygon_area(from.corners);
   exchange.error /= polygon_area(from.corners);
   return exchange;
@@ -182,21 +182,21 @@ void expect_honest(std::uint64_t seed, Tally& tally) {
 
 // The seeds are fixed: the test passes or fails for good. Errors are bounds, so no case may fail by chance.
 TEST(PolygonFuzz, StatesNoErrorBelowTheTrueOneBehindRandomOccluders) {
-  constexpr std::uint64_t kCases = 60;
+  constexpr std::uint64_t kCases = 40;
   Tally tally;
   for (std::uint64_t seed = 1; seed <= kCases && !HasFatalFailure(); ++seed) expect_honest(seed, tally);
-  EXPECT_GT(tally.num_occluded, 30);
-  EXPECT_GT(tally.num_occluded - tally.num_hidden, 25);
-  EXPECT_GT(tally.num_compared, 10);
+  EXPECT_GT(tally.num_occluded, 20);
+  EXPECT_GT(tally.num_occluded - tally.num_hidden, 15);
+  EXPECT_GE(tally.num_compared, 8);
   EXPECT_LE(tally.num_unmet, 2);
 }
 
 // Run by --gtest_also_run_disabled_tests: minutes.
 TEST(PolygonFuzz, DISABLED_StatesNoErrorBelowTheTrueOneBehindManyRandomOccluders) {
-  constexpr std::uint64_t kCases = 2000;
+  constexpr std::uint64_t kCases = 1000;
   Tally tally;
   for (std::uint64_t seed = 1001; seed <= 1000 + kCases && !HasFatalFailure(); ++seed) expect_honest(seed, tally);
-  EXPECT_GT(tally.num_compared, 300);
+  EXPECT_GT(tally.num_compared, 150);
 }
 
 }  // namespace

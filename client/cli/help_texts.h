@@ -36,6 +36,10 @@ inline constexpr char kSubmitFooter[] =
     "      a quick preview over the results of an earlier bake\n"
     "  radbake submit house.glb -o baked/ --sky 3000,3500,5000 --sun 0.4,-1,0.3:80000,76000,70000\n"
     "      daylight: a blue sky, and a sun that stands high\n"
+    "  radbake submit lab.glb -o baked/ --form-factors analytic --max-patches 500 --solver lu\n"
+    "      a reference: form factors by formula, elimination; for small scenes\n"
+    "  radbake submit city.glb -o baked/ --max-patches 200000 --memory 512M\n"
+    "      form factors that do not fit are streamed: made again, row by row, each time they are used\n"
     "  radbake submit room.glb -o baked/ --json | jq -r 'select(.event == \"progress\") | .progress.fraction'\n"
     "      one event a line, for programs\n\n";
 

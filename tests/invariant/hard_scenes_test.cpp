@@ -157,6 +157,26 @@ TEST(HardCase22ReversedNormals, AreReportedAsLightLostAtBacks) {
   EXPECT_FALSE(wrong.report.energy.is_closed);
 }
 
+TEST(HardCase22ReversedNormals, AreWarnedOfWhereMostRaysMeetBacks) {
+  const auto warning_of = [](const BakeOutcome& outcome) -> std::string {
+    for (const Warning& warning : outcome.report.warnings) {
+      if (warning.id == "sees_backs") return warning.text;
+    }
+    return "";
+  };
+  Scene scene = tests::small_emitter_room(0.5);
+  EXPECT_EQ(warning_of(tests::baked(scene, kSmallBake)), "");
+  // A room turned inside out: the block in it, and the panel, see nothing but backs.
+  for (Mesh& mesh : scene.meshes) {
+    if (mesh.name.find("room") == std::string::npos) continue;
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  }
+  const auto outcome = tests::baked(scene, kSmallBake);
+  expect_finite(outcome);
+  EXPECT_NE(warning_of(outcome).find("mostly backs"), std::string::npos) << warning_of(outcome);
+  EXPECT_NE(warning_of(outcome).find("block"), std::string::npos) << warning_of(outcome);
+}
+
 TEST(HardCase04Coincident, SurfacesOfABakeGiveNoNan) {
   // Two sheets in one place, front to front and back to back, and one twice over.
   tests::RoomBuilder builder(4);

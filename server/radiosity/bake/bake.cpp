@@ -80,6 +80,7 @@ class Bake {
     report.num_row_rays = system.num_row_rays;
     report.num_light_rays = system.num_light_rays;
     report.transport = system.summary;
+    report.warnings.insert(report.warnings.end(), system.warnings.begin(), system.warnings.end());
 
     SolveOptions options;
     options.max_sweeps = max_sweeps_of(report.plan.survey.max_reflectance, options.relative_tolerance);

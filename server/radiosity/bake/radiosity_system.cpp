@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <string>
 
 #include "server/radiosity/form_factor/adaptive.h"
 #include "server/radiosity/form_factor/analytic_rows.h"
@@ -54,6 +55,33 @@ void fill_light(const std::vector<TakenRow>& rows, Vec3 sky, RadiositySystem& sy
     system.summary.row_error_max = std::max(system.summary.row_error_max, row.stated_error);
     system.summary.num_rows_clipped += row.clipped > 0;
   }
+}
+
+/// Warns of meshes more than half of whose light meets the backs of single-sided surfaces: reversed normals, or a place
+/// inside something else.
+void warn_of_backs(const Preparation& prepared, const std::vector<TakenRow>& rows, std::vector<Warning>& warnings) {
+  const Surfaces& surfaces = prepared.surveyed.surfaces;
+  std::vector<double> areas(surfaces.scene->meshes.size(), 0), absorbed(areas);
+  for (std::uint32_t i = 0; i < prepared.patches.num_cells(); ++i) {
+    const auto& [row, sample, length] = rows[i];
+    const std::uint32_t mesh = surfaces.meshes[prepared.patches.pieces(i).front().triangle];
+    const double seen = row.counted > 0 ? sample.visible_share * (1 - row.absorbed / row.counted) : 0;
+    areas[mesh] += prepared.patches.area(i);
+    absorbed[mesh] += prepared.patches.area(i) * (1 - seen);
+  }
+  constexpr std::size_t kMostNames = 3;
+  std::size_t count = 0;
+  std::string names;
+  for (std::size_t m = 0; m < areas.size(); ++m) {
+    if (absorbed[m] <= areas[m] / 2) continue;
+    if (++count <= kMostNames) names += (names.empty() ? "'" : ", '") + surfaces.scene->meshes[m].name + "'";
+  }
+  if (count == 0) return;
+  warnings.push_back({"sees_backs", std::to_string(count) + (count == 1 ? " mesh sees" : " meshes see") +
+                                        " mostly backs of single-sided surfaces (" + names +
+                                        (count > kMostNames ? ", ..." : "") +
+                                        "): their normals or those of what they see may be reversed, or they lie "
+                                        "inside other objects"});
 }
 
 /// All rows in one piece, areas in square metres. Takes the entries.
@@ -145,6 +173,7 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
       on_row, stop);
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   fill_light(rows, sky, *system);
+  warn_of_backs(prepared, rows, system->warnings);
 
   // Put the operator together.
   EstimatedRows estimated = collected(patches, surfaces.metres_per_unit * surfaces.metres_per_unit, rows);

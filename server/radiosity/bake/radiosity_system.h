@@ -25,6 +25,7 @@ struct RadiositySystem {
   double emitted_lumens = 0;             ///< of the emitters, mean of the channels
   TransportSummary summary;
   std::uint64_t num_row_rays = 0, num_light_rays = 0;
+  std::vector<Warning> warnings;
 
   /// What a streamed operator goes on using.
   std::unique_ptr<RowEstimator> estimator;

@@ -62,6 +62,7 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
   row.arrivals.resize(scratch.rays.size());
   std::uint32_t num_arrivals = 0;
   std::size_t num_buried = 0, k = 0;
+  constexpr std::size_t kAhead = 16;  // a large scene's triangles are not in the cache
   for (std::size_t s = 0; s < sites.size(); ++s) {
     RowSample::SiteRays own;
     own.first_arrival = num_arrivals;
@@ -69,6 +70,9 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
     std::uint32_t absorbed = 0;
     for (; k < scratch.end_of_site[s]; ++k) {
       const Hit& hit = scratch.hits[k];
+      if (k + kAhead < scratch.hits.size() && scratch.hits[k + kAhead].triangle != kNoHit) {
+        patches_.expect(scratch.hits[k + kAhead].triangle);
+      }
       if (hit.triangle == kNoHit) {
         ++own.escaped;
         continue;

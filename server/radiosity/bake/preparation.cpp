@@ -34,7 +34,7 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   prepared->visibility = make_embree_visibility(surfaces.corners, stop);
   if (!prepared->visibility || stop.stop_requested()) return cancelled;
   prepared->patches =
-      make_patches(surfaces, *prepared->visibility, {patch_edge(texel_edge, area, max_patches), max_patches});
+      make_patches(surfaces, *prepared->visibility, {patch_edge(texel_edge, area, max_patches), max_patches, stop});
   if (stop.stop_requested()) return cancelled;
 
   BakePlan& plan = prepared->plan;

@@ -182,8 +182,9 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
     return system;
   }
   rows = {};
-  auto sparse = std::make_unique<SparseOperator>(estimated);
+  auto sparse = std::make_unique<SparseOperator>(estimated, stop);
   estimated = {};
+  if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   summarise(sparse->repair(), system->summary);
   if (prepared.plan.transport == Transport::kDense) {
     system->transport = std::make_unique<DenseOperator>(*sparse);

@@ -80,7 +80,7 @@ bool runs_through_cell(Vec2 a, Vec2 b, double column, double row) {
 }  // namespace
 
 void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<std::uint8_t>& is_double_sided,
-                              std::size_t max_new) {
+                              std::size_t max_new, const std::stop_token& stop) {
   // Sort the pieces by cell, in order within one.
   const std::size_t num_cells = is_double_sided.size();
   std::vector<std::size_t> first(num_cells + 1, 0);
@@ -100,7 +100,8 @@ void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::ve
   patches_.first_cut_.assign(1, 0);
   for (std::size_t c = 0; c < num_cells; ++c) {
     const std::span<const Piece> pieces(&sorted[first[c]], first[c + 1] - first[c]);
-    find_cuts(pieces, cuts);
+    cuts.clear();
+    if (!stop.stop_requested()) find_cuts(pieces, cuts);
     parts.clear();
     for (const Piece& piece : pieces) split(piece, cuts, parts);
     std::vector<std::uint32_t> sides;

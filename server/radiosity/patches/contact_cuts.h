@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "server/radiosity/patches/patches.h"
@@ -20,9 +21,9 @@ class ContactCutter {
       : surfaces_(surfaces), visibility_(visibility), group_of_(group_of), patches_(patches) {}
 
   /// Turns cells into parts: cell_of_piece and is_double_sided are by grid cell before, by front patch after.
-  /// At most max_new patches are added; cells beyond that stay whole and are counted.
+  /// At most max_new patches are added; cells beyond that stay whole and are counted. Stopped, cells stay whole.
   void cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::vector<std::uint8_t>& is_double_sided,
-                 std::size_t max_new);
+                 std::size_t max_new, const std::stop_token& stop);
 
  private:
   using Cut = Patches::Cut;

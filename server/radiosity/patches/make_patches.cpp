@@ -67,7 +67,7 @@ class PatchBuilder {
     lay_grids(edge, merging);
     cell_of_piece_.clear();
     cell_is_double_sided_.clear();
-    for (std::uint32_t t = 0; t < surfaces_.size(); ++t) {
+    for (std::uint32_t t = 0; t < surfaces_.size() && !options_.stop.stop_requested(); ++t) {
       cut_triangle(t);
       if (count_ > 4 * max_uncut_) return false;
     }
@@ -212,7 +212,7 @@ class PatchBuilder {
   /// back patches.
   void finish() {
     ContactCutter cutter(surfaces_, visibility_, groups_.group_of, result_);
-    cutter.cut_cells(cell_of_piece_, cell_is_double_sided_, options_.max_patches - count_);
+    cutter.cut_cells(cell_of_piece_, cell_is_double_sided_, options_.max_patches - count_, options_.stop);
     const std::size_t num_cells = cell_is_double_sided_.size();
     std::vector<std::uint64_t>& first = result_.first_piece_;
     first.assign(num_cells + 1, 0);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <stop_token>
 #include <unordered_map>
 #include <vector>
 
@@ -17,6 +18,7 @@ inline constexpr std::uint32_t kNoPatch = 0xffffffffu;
 struct PatchOptions {
   double edge = 0;              ///< wanted length of a patch's side, scene units
   std::size_t max_patches = 0;  ///< bound on the number of patches, both sides of sheets counted
+  std::stop_token stop = {};    ///< stopped early, the patches mean nothing
 };
 
 /// The senders: surface elements of constant radiosity, and the look-up from a hit to its element.

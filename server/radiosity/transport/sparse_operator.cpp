@@ -54,12 +54,12 @@ void merge_row_and_column(const EstimatedRows& rows, const Transposed& columns, 
 
 }  // namespace
 
-SparseOperator::SparseOperator(const EstimatedRows& rows) : areas_(rows.areas) {
-  pair_estimates(rows);
-  restore_row_sums(rows);
+SparseOperator::SparseOperator(const EstimatedRows& rows, const std::stop_token& stop) : areas_(rows.areas) {
+  pair_estimates(rows, stop);
+  if (!stop.stop_requested()) restore_row_sums(rows, stop);
 }
 
-void SparseOperator::pair_estimates(const EstimatedRows& rows) {
+void SparseOperator::pair_estimates(const EstimatedRows& rows, const std::stop_token& stop) {
   const std::size_t n = rows.size();
   const Transposed columns(rows);
   // Count, then fill, each row by itself.
@@ -77,6 +77,7 @@ void SparseOperator::pair_estimates(const EstimatedRows& rows) {
   std::vector<double> squares(n, 0), weights(n, 0);
   const auto rays_per_area = [&](std::uint32_t i) { return areas_[i] > 0 ? rows.counted[i] / areas_[i] : 0; };
   for_each_row(n, [&](std::uint32_t i) {
+    if (stop.stop_requested()) return;
     std::uint64_t at = first_[i];
     const double wi = rays_per_area(i);
     merge_row_and_column(rows, columns, i, [&](std::uint32_t j, double own, double other) {
@@ -106,7 +107,7 @@ double SparseOperator::scaled_row(std::uint32_t i) const {
   return sum * scale_[i];
 }
 
-void SparseOperator::restore_row_sums(const EstimatedRows& rows) {
+void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop) {
   const std::size_t n = rows.size();
   scale_.assign(n, 1);
   std::vector<double> target(n, 0), sums(n, 0);
@@ -141,7 +142,8 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows) {
   double worst = measure(true), best = worst;
   int sweeps_since_best = 0;
   constexpr int kPatience = 20;
-  while (worst > kRowSumTolerance && repair_.scaling_sweeps < kMaxScalingSweeps && sweeps_since_best < kPatience) {
+  while (worst > kRowSumTolerance && repair_.scaling_sweeps < kMaxScalingSweeps && sweeps_since_best < kPatience &&
+         !stop.stop_requested()) {
     for (std::size_t i = 0; i < n; ++i) {
       if (target[i] > 0 && sums[i] > 0) scale_[i] *= std::sqrt(target[i] / sums[i]);
     }

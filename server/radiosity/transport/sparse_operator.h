@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <stop_token>
 
 #include "server/radiosity/transport/estimated_rows.h"
 #include "server/radiosity/transport/operator.h"
@@ -32,7 +33,8 @@ struct TransportRepair {
 /// van Leersum 1989 (why row sums and reciprocity both matter).
 class SparseOperator final : public TransportOperator {
  public:
-  explicit SparseOperator(const EstimatedRows& rows);
+  /// Stopped early, the operator means nothing.
+  explicit SparseOperator(const EstimatedRows& rows, const std::stop_token& stop = {});
 
   const TransportRepair& repair() const { return repair_; }
 
@@ -53,8 +55,8 @@ class SparseOperator final : public TransportOperator {
   std::span<const double> areas() const override { return areas_; }
 
  private:
-  void pair_estimates(const EstimatedRows& rows);
-  void restore_row_sums(const EstimatedRows& rows);
+  void pair_estimates(const EstimatedRows& rows, const std::stop_token& stop);
+  void restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop);
   double scaled_row(std::uint32_t i) const;
 
   std::vector<std::uint64_t> first_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <sstream>
 
 namespace radbake::radiosity {
 namespace {
@@ -75,8 +76,10 @@ Result<HalfSpace> plane_of(std::span<const Vec3> corners, double ulp, const std:
   double furthest = 0;
   for (const Vec3& corner : corners) furthest = std::max(furthest, std::abs(front.distance(corner)));
   if (furthest > kPlanarUlps * ulp) {
-    return invalid_argument(name + " is not planar: a corner is off its plane by " + std::to_string(furthest / ulp) +
-                            " ulp of its largest coordinate, at most 8 allowed");
+    std::ostringstream text;
+    text << name << " is not planar: a corner is off its plane by " << furthest / ulp
+         << " ulp of its largest coordinate, at most " << kPlanarUlps << " allowed";
+    return invalid_argument(text.str());
   }
   return front;
 }

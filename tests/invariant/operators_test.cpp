@@ -101,6 +101,26 @@ TEST(EveryEstimator, FindsNoLightInWhatIsSealed) {
     EXPECT_EQ(num_dark(estimator), expected) << form_factors_name(estimator);
 }
 
+// Fins that cross on one line: more chains of occluders than the formula counts.
+TEST(RowsByFormula, SayHowUncertainTheyAreWhereTooManySurfacesCross) {
+  constexpr int kFins = 5;
+  RoomBuilder builder(5);
+  const int grey = builder.add_material("grey", {0.5, 0.5, 0.5}, {1, 1, 1}, true);
+  builder.add_box("room", {-2, 0, -2}, {2, 3, 2}, grey, true);
+  for (int k = 0; k < kFins; ++k) {
+    const double angle = 0.2 + 0.39 * k;
+    const Vec3 along{std::cos(angle), 0.13 * k - 0.4, std::sin(angle)};
+    builder.add_quad("fin", Vec3{0.01 * k, 0.6, 0} - along, along * 2, {0.02 * k, 1.5, 0.1}, grey);
+  }
+  const BakeOutcome outcome = baked(builder.scene(), small_bake(FormFactors::kAnalytic, Transport::kSparse));
+  const bool is_warned = std::any_of(outcome.report.warnings.begin(), outcome.report.warnings.end(),
+                                     [](const Warning& warning) { return warning.id == "formula_uncertain"; });
+  EXPECT_TRUE(is_warned);
+  EXPECT_GT(outcome.report.transport.row_error_max, 0.01);
+  // What is stated covers what the rows lack to 1.
+  EXPECT_LE(outcome.report.transport.raw_closure_max, outcome.report.transport.row_error_max + 1e-6);
+}
+
 TEST(DenseOperator, BakesTheBytesOfTheSparseOne) {
   for (const FormFactors estimator : kEstimators) {
     const Scene scene = small_emitter_room(0.8);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <sstream>
 #include <string>
 
 #include "server/radiosity/form_factor/adaptive.h"
@@ -82,6 +83,24 @@ void warn_of_backs(const Preparation& prepared, const std::vector<TakenRow>& row
                                         (count > kMostNames ? ", ..." : "") +
                                         "): their normals or those of what they see may be reversed, or they lie "
                                         "inside other objects"});
+}
+
+/// Warns of rows by formula whose stated error is large: too many surfaces cross between some patches.
+void warn_of_uncertain_rows(const std::vector<TakenRow>& rows, std::vector<Warning>& warnings) {
+  constexpr double kLarge = 0.01;
+  std::size_t count = 0;
+  double largest = 0;
+  for (const TakenRow& taken : rows) {
+    count += taken.row.stated_error > kLarge;
+    largest = std::max(largest, taken.row.stated_error);
+  }
+  if (count == 0) return;
+  std::ostringstream text;
+  text << "the form factors of " << count << " of " << rows.size()
+       << " patches are uncertain by more than 1 %, by up to " << 100 * largest
+       << " % in sum: too many surfaces cross between them for the formula; rays (--form-factors "
+       << "hemisphere or adaptive) have no such limit";
+  warnings.push_back({"formula_uncertain", text.str()});
 }
 
 /// All rows in one piece, areas in square metres. Takes the entries.
@@ -174,6 +193,7 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   fill_light(rows, sky, *system);
   warn_of_backs(prepared, rows, system->warnings);
+  warn_of_uncertain_rows(rows, system->warnings);
 
   // Put the operator together.
   EstimatedRows estimated = collected(patches, surfaces.metres_per_unit * surfaces.metres_per_unit, rows);

@@ -158,7 +158,8 @@ void add_bake_options(CLI::App& command, BakeChoices& choices) {
       ->type_name("N");
   command
       .add_option("--max-patches", choices.max_patches,
-                  "Bound on the number of patches, the senders of light; default: the server's, 16384")
+                  "Bound on the number of patches, the senders of light; default: the server's, 16384, or 1024 "
+                  "with form factors by formula")
       ->check(check_positive, "")
       ->type_name("N");
   command

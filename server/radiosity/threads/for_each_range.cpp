@@ -26,15 +26,23 @@ class Order {
 }  // namespace
 
 void for_each_range(std::size_t n, std::size_t grain, const std::function<void(std::size_t, std::size_t)>& body) {
-  // Two, so that one range is not ordered after another.
+  // Two, so that one range is not ordered after another. At the ends of scopes, which what a body throws leaves too.
   Order fork, join;
+  struct AcquireAtEnd {
+    Order& order;
+    ~AcquireAtEnd() { order.acquire(); }
+  };
+  struct ReleaseAtEnd {
+    Order& order;
+    ~ReleaseAtEnd() { order.release(); }
+  };
   fork.release();
+  const AcquireAtEnd joined{join};
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain), [&](const tbb::blocked_range<std::size_t>& range) {
     fork.acquire();
+    const ReleaseAtEnd done{join};
     body(range.begin(), range.end());
-    join.release();
   });
-  join.acquire();
 }
 
 }  // namespace radbake::radiosity

@@ -138,19 +138,15 @@ void summarise(const TransportRepair& repair, TransportSummary& summary) {
 std::unique_ptr<TransportOperator> make_streamed(const EstimatedRows& rows, const std::vector<TakenRow>& taken,
                                                  Solver solver, RadiositySystem& system, std::stop_token stop) {
   RowSums sums;
-  double area = 0, escaped = 0, absorbed = 0;
   for (std::uint32_t i = 0; i < rows.size(); ++i) {
     sums.measured.push_back(rows.measured_row_sum(i));
     sums.lengths.push_back(taken[i].length);
     system.summary.num_entries += taken[i].length;
-    if (rows.counted[i] == 0) continue;
-    area += rows.areas[i];
-    escaped += rows.areas[i] * rows.escaped[i] / rows.counted[i];
-    absorbed += rows.areas[i] * rows.absorbed[i] / rows.counted[i];
   }
   sums.areas = rows.areas;
-  system.summary.escape_share = area > 0 ? escaped / area : 0;
-  system.summary.absorbed_share = area > 0 ? absorbed / area : 0;
+  const EstimatedRows::LostShares lost = rows.lost_shares();
+  system.summary.escape_share = lost.escaped;
+  system.summary.absorbed_share = lost.absorbed;
   const RowSource source = [&sampler = *system.sampler, counted = rows.counted, stop](
                                std::uint32_t patch, std::vector<EstimatedRows::Entry>& entries) {
     entries.clear();

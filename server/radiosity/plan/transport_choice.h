@@ -19,8 +19,8 @@ inline const char* transport_name(Transport transport) {
 
 /// Bytes that an operator takes at most while it is put together. Shapes: entries of a row at most.
 ///
-///   sparse    n (8 e estimated + 8 e transposed + 16 e paired both ways),  e = min(n, entries of a row)
-///   dense     the paired rows and 8 n^2
+///   sparse    n (8 e estimated + 8 e transposed + 8 min(n, 2 e) paired),  e = min(n, entries of a row)
+///   dense     the larger of that and the paired rows with 8 n^2
 ///   streamed  64 n: sums and areas
 std::uint64_t transport_bytes(Transport transport, std::uint64_t num_patches, std::uint64_t row_entries);
 

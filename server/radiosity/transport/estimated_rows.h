@@ -26,6 +26,23 @@ struct EstimatedRows {
   double measured_row_sum(std::uint32_t i) const {
     return counted[i] > 0 ? 1 - (escaped[i] + absorbed[i]) / counted[i] : 0;
   }
+
+  /// What of all rows escaped and was absorbed, weighted by area.
+  struct LostShares {
+    double escaped = 0, absorbed = 0;
+  };
+  LostShares lost_shares() const {
+    LostShares lost;
+    double area = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (counted[i] == 0) continue;
+      area += areas[i];
+      lost.escaped += areas[i] * escaped[i] / counted[i];
+      lost.absorbed += areas[i] * absorbed[i] / counted[i];
+    }
+    if (area > 0) lost = {lost.escaped / area, lost.absorbed / area};
+    return lost;
+  }
 };
 
 }  // namespace radbake::radiosity

@@ -111,7 +111,7 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop
   const std::size_t n = rows.size();
   scale_.assign(n, 1);
   std::vector<double> target(n, 0), sums(n, 0);
-  double area = 0, escaped = 0, absorbed = 0;
+  double area = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
     target[i] = areas_[i] * rows.measured_row_sum(i);
     if (rows.counted[i] == 0) continue;
@@ -120,11 +120,10 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop
     const double closure = (arrived + rows.escaped[i] + rows.absorbed[i]) / rows.counted[i];
     repair_.raw_closure_max = std::max(repair_.raw_closure_max, std::fabs(closure - 1));
     area += areas_[i];
-    escaped += areas_[i] * rows.escaped[i] / rows.counted[i];
-    absorbed += areas_[i] * rows.absorbed[i] / rows.counted[i];
   }
-  repair_.escape_share = area > 0 ? escaped / area : 0;
-  repair_.absorbed_share = area > 0 ? absorbed / area : 0;
+  const EstimatedRows::LostShares lost = rows.lost_shares();
+  repair_.escape_share = lost.escaped;
+  repair_.absorbed_share = lost.absorbed;
 
   // d_i <- d_i sqrt(target_i / row_i) until the rows fit or stop getting better.
   const auto measure = [&](bool with_rms) {

@@ -7,6 +7,7 @@
 #include "server/radiosity/form_factor/hemisphere_rows.h"
 #include "server/radiosity/survey/survey.h"
 #include "tests/scenes/rooms.h"
+#include "tests/unit/radiosity/cut_scene.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -15,17 +16,8 @@ constexpr int kRays = 1024;
 // Weights are floats; a row of n of them is rounded by at most 2^-24 of its sum.
 constexpr double kRoundingOfWeights = 0x1p-23;
 
-struct Room {
-  Scene scene;
-  SurveyedScene surveyed;
-  std::unique_ptr<Visibility> visibility;
-  Patches patches;
-
-  Room(tests::RoomBuilder builder, double edge)
-      : scene(std::move(builder.scene())),
-        surveyed(survey_scene(scene).value()),
-        visibility(make_embree_visibility(surveyed.surfaces.corners)),
-        patches(make_patches(surveyed.surfaces, *visibility, {edge / surveyed.surfaces.metres_per_unit, 4096})) {}
+struct Room : CutScene {
+  Room(tests::RoomBuilder builder, double edge) : CutScene(std::move(builder.scene()), edge, 4096) {}
 
   std::vector<Site> sites(const RowEstimator& estimator, std::uint32_t patch, std::uint64_t seed) const {
     const SobolPoints points(estimator.num_sites());

@@ -6,6 +6,7 @@
 
 #include "server/radiosity/form_factor/analytic.h"
 #include "server/radiosity/form_factor/analytic_quadrature.h"
+#include "tests/unit/radiosity/polygon_pairs.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -20,29 +21,6 @@ PolygonFormFactor form_factor(const PolygonCorners& from, const PolygonCorners& 
   const auto result = polygon_form_factor(from, to, occluders, tolerance);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
   return result.ok() ? *result : PolygonFormFactor{NAN, NAN, AnalyticMethod::kZero, 0};
-}
-
-/// A parallelogram that faces along cross(u, v).
-PolygonCorners parallelogram(Vec3 corner, Vec3 u, Vec3 v) { return {corner, corner + u, corner + u + v, corner + v}; }
-
-PolygonCorners reversed(const PolygonCorners& corners) { return {corners.rbegin(), corners.rend()}; }
-
-/// Howell's C-11: parallel equal rectangles a x b at distance c.
-double parallel_rectangles(double a, double b, double c) {
-  const double X = a / c, Y = b / c, X2 = X * X, Y2 = Y * Y;
-  return 2 / (M_PI * X * Y) *
-         (std::log((1 + X2) * (1 + Y2) / (1 + X2 + Y2)) / 2 + X * std::sqrt(1 + Y2) * std::atan(X / std::sqrt(1 + Y2)) +
-          Y * std::sqrt(1 + X2) * std::atan(Y / std::sqrt(1 + X2)) - X * std::atan(X) - Y * std::atan(Y));
-}
-
-/// Howell's C-14: perpendicular rectangles w x l and h x l that share the edge l.
-double perpendicular_rectangles(double w, double h, double l) {
-  const double W = w / l, H = h / l, W2 = W * W, H2 = H * H, s2 = W2 + H2, s = std::sqrt(s2);
-  return 1 / (M_PI * W) *
-         (W * std::atan(1 / W) + H * std::atan(1 / H) - s * std::atan(1 / s) +
-          (std::log((1 + W2) * (1 + H2) / (1 + s2)) + W2 * std::log(W2 * (1 + s2) / ((1 + W2) * s2)) +
-           H2 * std::log(H2 * (1 + s2) / ((1 + H2) * s2))) /
-              4);
 }
 
 /// The faces of a box that face inwards: floor, ceiling, x = 0, x = size, y = 0, y = size.
@@ -131,7 +109,7 @@ TEST(PolygonFormFactor, KeepsReciprocityForAreasTwelveDecadesApart) {
 TEST(PolygonFormFactor, ClosesAndPairsNestedBoxes) {
   const auto outer = faces_inward({0, 0, 0}, 1);
   std::array<PolygonCorners, 6> inner = faces_inward({0.25, 0.25, 0.25}, 0.5);
-  for (PolygonCorners& face : inner) face = reversed(face);
+  for (PolygonCorners& face : inner) face = turned_over(face);
   const std::vector<PolygonCorners> box(inner.begin(), inner.end());
   double sum = 0, to_inner = 0, stated = 0;
   for (std::size_t j = 0; j < 6; ++j) {

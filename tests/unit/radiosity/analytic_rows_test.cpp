@@ -9,6 +9,7 @@
 #include "server/radiosity/form_factor/hemisphere.h"
 #include "server/radiosity/survey/survey.h"
 #include "tests/scenes/rooms.h"
+#include "tests/unit/radiosity/cut_scene.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -19,17 +20,8 @@ constexpr double kRoundingOfWeights = 0x1p-24;
 constexpr double kAskedClosure = 2e-7;
 
 /// Quads in metres; the patches' edge is `edge`.
-struct Room {
-  Scene scene;
-  SurveyedScene surveyed;
-  std::unique_ptr<Visibility> visibility;
-  Patches patches;
-
-  Room(tests::RoomBuilder builder, double edge)
-      : scene(std::move(builder.scene())),
-        surveyed(survey_scene(scene).value()),
-        visibility(make_embree_visibility(surveyed.surfaces.corners)),
-        patches(make_patches(surveyed.surfaces, *visibility, {edge / surveyed.surfaces.metres_per_unit, 4096})) {}
+struct Room : CutScene {
+  Room(tests::RoomBuilder builder, double edge) : CutScene(std::move(builder.scene()), edge, 4096) {}
 
   FormFactorRow row(const AnalyticEstimator& estimator, std::uint32_t patch, bool* is_buried = nullptr) const {
     FormFactorRow result;

@@ -8,23 +8,14 @@
 #include "server/radiosity/form_factor/hemicube_rows.h"
 #include "server/radiosity/survey/survey.h"
 #include "tests/scenes/rooms.h"
+#include "tests/unit/radiosity/cut_scene.h"
 
 namespace radbake::radiosity {
 namespace {
 
 /// A scene, its patches and what stands in the way.
-struct Room {
-  Scene scene;
-  SurveyedScene surveyed;
-  std::unique_ptr<Visibility> visibility;
-  Patches patches;
-
-  Room(Scene s, double edge_metres)
-      : scene(std::move(s)),
-        surveyed(survey_scene(scene).value()),
-        visibility(make_embree_visibility(surveyed.surfaces.corners)),
-        patches(make_patches(surveyed.surfaces, *visibility, {edge_metres / surveyed.surfaces.metres_per_unit, 4096})) {
-  }
+struct Room : CutScene {
+  Room(Scene s, double edge_metres) : CutScene(std::move(s), edge_metres, 4096) {}
 
   FormFactorRow row(std::uint32_t patch, int resolution, std::uint64_t seed) const {
     const HemicubeEstimator estimator(surveyed.surfaces, patches, *visibility, resolution);

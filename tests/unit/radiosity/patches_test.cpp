@@ -9,24 +9,10 @@
 
 #include "server/radiosity/survey/survey.h"
 #include "tests/scenes/rooms.h"
+#include "tests/unit/radiosity/cut_scene.h"
 
 namespace radbake::radiosity {
 namespace {
-
-/// A scene cut into patches.
-struct Cut {
-  Scene scene;
-  SurveyedScene surveyed;
-  std::unique_ptr<Visibility> visibility;
-  Patches patches;
-
-  Cut(Scene s, double edge_metres, std::size_t max_patches)
-      : scene(std::move(s)),
-        surveyed(survey_scene(scene).value()),
-        visibility(make_embree_visibility(surveyed.surfaces.corners)),
-        patches(make_patches(surveyed.surfaces, *visibility,
-                             {edge_metres / surveyed.surfaces.metres_per_unit, max_patches})) {}
-};
 
 double total_area(const Patches& patches) {
   double area = 0;
@@ -37,7 +23,7 @@ double total_area(const Patches& patches) {
 constexpr double kRounding = 1e-9;
 
 TEST(Patches, TileTheSurfaceAndFindTheirOwnSamples) {
-  const Cut cut(tests::furnace_room(0.5), 0.25, 10000);
+  const CutScene cut(tests::furnace_room(0.5), 0.25, 10000);
   const double area = std::accumulate(cut.surveyed.surfaces.areas.begin(), cut.surveyed.surfaces.areas.end(), 0.0);
   EXPECT_NEAR(total_area(cut.patches) / area, 1, kRounding);
   int strays = 0;
@@ -54,7 +40,7 @@ TEST(Patches, TileTheSurfaceAndFindTheirOwnSamples) {
 }
 
 TEST(Patches, OfSingleSidedSurfacesHaveNoBack) {
-  const Cut cut(tests::furnace_room(0.5), 0.5, 10000);
+  const CutScene cut(tests::furnace_room(0.5), 0.5, 10000);
   EXPECT_EQ(cut.patches.size(), cut.patches.num_cells());
   EXPECT_EQ(cut.patches.find(0, 0.3, 0.3, true), kNoPatch);
 }
@@ -62,7 +48,7 @@ TEST(Patches, OfSingleSidedSurfacesHaveNoBack) {
 TEST(Patches, OfDoubleSidedSurfacesHaveAPatchOnEachSide) {
   Scene scene = tests::furnace_room(0.5);
   for (Material& material : scene.materials) material.is_double_sided = true;
-  const Cut cut(std::move(scene), 0.5, 10000);
+  const CutScene cut(std::move(scene), 0.5, 10000);
   EXPECT_EQ(cut.patches.size(), 2 * cut.patches.num_cells());
   const std::uint32_t back = cut.patches.find(0, 0.3, 0.3, true);
   EXPECT_TRUE(cut.patches.is_back(back));
@@ -88,7 +74,7 @@ TEST(Patches, KeepTheBoundForAMillionSlivers) {
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }
   scene.meshes.push_back(std::move(mesh));
-  const Cut cut(std::move(scene), 0.01, 4096);
+  const CutScene cut(std::move(scene), 0.01, 4096);
   EXPECT_LE(cut.patches.size(), 4096u);
   EXPECT_GE(cut.patches.size(), 500u);
   const double area = std::accumulate(cut.surveyed.surfaces.areas.begin(), cut.surveyed.surfaces.areas.end(), 0.0);
@@ -101,7 +87,7 @@ TEST(Patches, KeepTheSmallestBoundForManyMaterials) {
     scene.materials.push_back(scene.materials[0]);
     scene.meshes[m].material = static_cast<int>(scene.materials.size()) - 1;
   }
-  EXPECT_LE(Cut(std::move(scene), 0.01, 64).patches.size(), 64u);
+  EXPECT_LE(CutScene(std::move(scene), 0.01, 64).patches.size(), 64u);
 }
 
 TEST(Patches, AreCutWhereAWallStandsOnTheFloor) {
@@ -110,7 +96,7 @@ TEST(Patches, AreCutWhereAWallStandsOnTheFloor) {
   const int grey = builder.add_material("grey", {0.5, 0.5, 0.5}, {1, 1, 1});
   builder.add_quad("floor", {0, 0, 0}, {0, 0, 4}, {4, 0, 0}, grey);
   builder.add_quad("wall", {1.5, 0, 0}, {0, 0, 4}, {0, 2, 0}, grey);
-  const Cut cut(builder.scene(), 4, 64);
+  const CutScene cut(builder.scene(), 4, 64);
   std::set<std::uint32_t> left, right;
   for (std::uint32_t t = 0; t < 2; ++t) {
     for (double u = 0.05; u < 1; u += 0.1) {
@@ -133,7 +119,7 @@ TEST(Patches, AreCutWhereAWallStandsOnASideBetweenTwoTrianglesOfTheFloor) {
   const int grey = builder.add_material("grey", {0.5, 0.5, 0.5}, {1, 1, 1});
   builder.add_quad("floor", {0, 0, 0}, {0, 0, 4}, {4, 0, 0}, grey);
   builder.add_quad("wall", {0, 0, 0}, {4, 0, 4}, {0, 2, 0}, grey);
-  const Cut cut(builder.scene(), 4, 64);
+  const CutScene cut(builder.scene(), 4, 64);
   EXPECT_NE(cut.patches.find(0, 0.3, 0.3, false), cut.patches.find(1, 0.3, 0.3, false));
 }
 
@@ -158,9 +144,9 @@ TEST(Patches, OfAHillySurfaceAreNotCutWhereItsGroupsMeet) {
   }
   scene.meshes.push_back(hills);
   // Room for no cut at all: were borders contacts, cells would be left uncut and counted.
-  const std::size_t num_patches = Cut(scene, 1, 100000).patches.size();
+  const std::size_t num_patches = CutScene(scene, 1, 100000).patches.size();
   EXPECT_LE(num_patches, 3200u);
-  const Cut cut(scene, 1, 4096);
+  const CutScene cut(scene, 1, 4096);
   EXPECT_EQ(cut.patches.num_uncut(), 0u);
   EXPECT_EQ(cut.patches.size(), num_patches);
   for (std::uint32_t i = 0; i < cut.patches.size(); ++i) EXPECT_GT(cut.patches.area(i), 0);
@@ -175,7 +161,7 @@ TEST(Patches, AreFoundQuicklyAsTheyAreFoundExactly) {
     builder.add_box("block", {1.03, 0, 1.51}, {2.2, 1.3, 2.7}, grey, false);
     const auto checked = survey_scene(builder.scene());
     ASSERT_TRUE(checked.ok()) << checked.error().message;
-    const Cut cut(builder.scene(), 0.25, 10000);
+    const CutScene cut(builder.scene(), 0.25, 10000);
     const Surfaces& surfaces = cut.surveyed.surfaces;
     std::mt19937_64 random(7);
     std::uniform_real_distribution<float> any(-1, 1), weight(0, 1);

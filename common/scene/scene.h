@@ -64,6 +64,14 @@ struct Material {
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   double alpha = 1;
   double alpha_cutoff = 0.5;
+  /// A thin sheet: this share of the light goes straight through. The reflectance texture multiplies it too;
+  /// reflectance + transmittance <= 1 in each channel.
+  Vec3 transmittance = {};
+  // What the file asks for and a diffuse bake does not simulate.
+  bool is_specular = false;    ///< mirrors or shines: metal, clear coat, roughness below one half
+  bool is_refractive = false;  ///< has an inside that bends light
+  bool has_normal_map = false;
+  bool has_volume = false;  ///< absorbs or scatters inside
 };
 
 /// Bounds of Mesh::texel_density.
@@ -99,16 +107,23 @@ struct SpotLight {
   double outer_cone_radians = 0.7853981633974483;
 };
 
-/// The sun: parallel light, illuminance in lx on a facing surface.
+/// The sun: light from a disc in the sky, illuminance in lx on a facing surface.
 struct DirectionalLight {
   Vec3 direction;  ///< in which the light travels, unit length
   Vec3 illuminance;
+  double angular_diameter_radians = 0;  ///< of the disc, below pi; 0: parallel light, hard shadows
 };
 
 struct Light {
   std::string name;
   std::variant<PointLight, SpotLight, DirectionalLight> kind;
 };
+
+/// Direction in which one looks -> place in an equirectangular image: u = atan2(z, x) / 2 pi + 1/2, v = acos(y) / pi.
+inline Vec2 equirectangular(Vec3 unit) {
+  constexpr double kPi = 3.14159265358979323846;
+  return {std::atan2(unit.z, unit.x) / (2 * kPi) + 0.5, std::acos(std::fmax(-1.0, std::fmin(unit.y, 1.0))) / kPi};
+}
 
 /// What is baked: meshes in world space, their materials, and the lights. Plain data.
 struct Scene {
@@ -117,6 +132,9 @@ struct Scene {
   std::vector<TexturePlane> textures;
   std::vector<Light> lights;
   Vec3 sky;  ///< luminance of a constant sky, nit; 0: none
+  /// A sky of every direction instead, luminance in nit, equirectangular(), 3 channels, width = 2 height.
+  std::optional<TexturePlane> environment = std::nullopt;
+  std::uint64_t num_instances = 0;  ///< of meshes that the file places more than once
 };
 
 /// A mesh placed in the world, as a file tells it.

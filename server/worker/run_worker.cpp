@@ -130,10 +130,10 @@ Result<v1::BakeResult> send_result(const radiosity::BakeOutcome& outcome, v1::Pr
 Result<v1::WorkerReport> plan(const v1::StartWork& start, ReportStream& stream) {
   RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
   RADBAKE_ASSIGN_OR_RETURN(
-      const radiosity::BakePlan planned,
+      const radiosity::PlannedBake planned,
       radiosity::plan_scene(scene, settings::to_options(start.settings(), start.run()), stream.stop_token()));
   v1::WorkerReport report;
-  *report.mutable_plan_finished() = to_message(planned);
+  *report.mutable_plan_finished() = to_message(planned.plan);
   return report;
 }
 

@@ -9,6 +9,7 @@
 #include "common/scene/scene.h"
 #include "server/radiosity/gather/mesh_output.h"
 #include "server/radiosity/plan/plan.h"
+#include "server/radiosity/plan/prediction.h"
 
 namespace radbake::radiosity {
 
@@ -94,9 +95,10 @@ struct VertexSummary {
 struct StageTime {
   std::string stage;
   double seconds = 0;
+  double cpu_seconds = 0;  ///< of the whole process
 };
 
-/// What a bake did. Everything but `stages` is the same for equal bakes.
+/// What a bake did. Everything but `stages`, `prediction` and `costs` is the same for equal bakes.
 struct BakeReport {
   std::string instruction_set;
   BakePlan plan;
@@ -108,6 +110,14 @@ struct BakeReport {
   VertexSummary vertices;
   std::vector<Warning> warnings;
   std::vector<StageTime> stages;
+  Prediction prediction;
+  HostCosts costs;  ///< as this bake measured them
+};
+
+/// What a bake would do, and what it is expected to take.
+struct PlannedBake {
+  BakePlan plan;
+  Prediction prediction;
 };
 
 struct BakeOutcome {
@@ -127,7 +137,7 @@ class BakeObserver {
 /// Checks a scene and says what a bake of it would do: layout, patches, counts. Traces no ray.
 ///
 /// Errors: kInvalidArgument names the mesh, index or material and the value.
-Result<BakePlan> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop = {});
+Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop = {});
 
 /// Bakes a scene: plan, patches, direct light, rows, solve, gather.
 ///

@@ -63,9 +63,9 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   return prepared;
 }
 
-Result<BakePlan> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop) {
+Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop) {
   RADBAKE_ASSIGN_OR_RETURN(const std::unique_ptr<Preparation> prepared, prepare_scene(scene, options, stop));
-  return prepared->plan;
+  return PlannedBake{prepared->plan, {}};
 }
 
 }  // namespace radbake::radiosity

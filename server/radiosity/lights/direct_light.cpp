@@ -44,7 +44,7 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
     if (!surfaces.is_emitter[t]) continue;
     const auto& c = surfaces.corners[t];
-    const double power = surfaces.areas[t] * mean_component(surfaces.exitances[t]);
+    const double power = surfaces.areas[t] * max_component(surfaces.exitances[t]);
     emitters_.push_back({t, (c[0] + c[1] + c[2]) / 3, power});
     cumulative_power_.push_back(sum += power);
   }
@@ -54,9 +54,10 @@ double DirectLight::emitted_lumens() const {
   const double square_metres = surfaces_.metres_per_unit * surfaces_.metres_per_unit;
   double lumens = 0;
   for (const Emitter& emitter : emitters_) {
-    lumens += emitter.power * square_metres * (surfaces_.material(emitter.triangle).is_double_sided ? 2 : 1);
+    lumens += surfaces_.areas[emitter.triangle] * mean_component(surfaces_.exitances[emitter.triangle]) *
+              square_metres * (surfaces_.material(emitter.triangle).is_double_sided ? 2 : 1);
   }
-  for (const Light& light : surfaces_.scene->lights) {
+  for (const Light& light : surfaces_.lights) {
     if (const auto* point = std::get_if<PointLight>(&light.kind)) {
       lumens += 4 * std::numbers::pi * mean_component(point->intensity);
     } else if (const auto* spot = std::get_if<SpotLight>(&light.kind)) {
@@ -151,7 +152,7 @@ void DirectLight::sample_lamps(const std::vector<const Site*>& sites, Scratch& s
   // Every site looks at every lamp once; replicates share the sites out where there are enough of them.
   const bool is_shared_out = sites.size() % num_replicates == 0;
   const std::size_t per_replicate = is_shared_out ? sites.size() / num_replicates : sites.size();
-  for (const Light& light : surfaces_.scene->lights) {
+  for (const Light& light : surfaces_.lights) {
     for (std::size_t r = 0; r < num_replicates; ++r) {
       for (std::size_t k = 0; k < per_replicate; ++k) {
         const Site& site = *sites[is_shared_out ? r * per_replicate + k : k];

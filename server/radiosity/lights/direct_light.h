@@ -27,7 +27,7 @@ class DirectLight {
   DirectLight(const Surfaces& surfaces, const Visibility& visibility, int samples);
 
   /// Whether there is anything to sample.
-  bool is_dark() const { return emitters_.empty() && surfaces_.scene->lights.empty(); }
+  bool is_dark() const { return emitters_.empty() && surfaces_.lights.empty(); }
   int samples() const { return points_.size(); }
 
   struct Scratch {
@@ -51,7 +51,7 @@ class DirectLight {
   struct Emitter {
     std::uint32_t triangle;
     Vec3 centroid;
-    double power;  ///< area times exitance, mean of the channels
+    double power;  ///< area times exitance, largest of the channels
   };
 
   void sample_emitters(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,

@@ -8,6 +8,8 @@
 #include "common/base/result.h"
 #include "common/scene/scene.h"
 #include "server/radiosity/lightmap/layout.h"
+#include "server/radiosity/plan/effect_plan.h"
+#include "server/radiosity/plan/prediction.h"
 #include "server/radiosity/plan/transport_choice.h"
 #include "server/radiosity/solve/solve.h"
 #include "server/radiosity/survey/survey.h"
@@ -44,7 +46,11 @@ struct BakeOptions {
   Transport transport = Transport::kAuto;
   std::optional<Solver> solver = std::nullopt;
   std::uint64_t transport_memory = 0;  ///< bytes; bounds what Transport::kAuto picks
-  int threads = 0;                     ///< 0: all cores; changes no result
+  EffectOverrides effects = {};
+  bool wants_direct = false, wants_indirect = false, wants_ao = false;  ///< lightmaps beside the one of all light
+  double ao_distance = 0;                                               ///< metres; 0: 1
+  int threads = 0;                                                      ///< 0: all cores; changes no result
+  HostCosts costs = {};  ///< as earlier bakes measured them; changes no result
 };
 
 /// What a bake will do. Field for field radbake.v1.Plan.
@@ -65,9 +71,13 @@ struct BakePlan {
   std::uint64_t transport_bytes = 0;        ///< that the form factors may take while they are put together
   std::uint64_t transport_bytes_limit = 0;  ///< what kAuto had to keep
   double texels_per_meter = 0;              ///< median over the lit triangles
+  std::vector<EffectPlan> effects = {};     ///< every effect once
+  int num_channels = 3;                     ///< that are solved; 1 where everything is grey
+  std::string form_factors_reason = {}, transport_reason = {}, solver_reason = {};
   std::vector<Warning> warnings;
 };
 
+inline constexpr double kDefaultAoDistance = 1;  ///< metres
 inline constexpr int kMinAtlasSize = kMinSheet;
 inline constexpr int kMaxAtlasSize = kMaxSheet;
 inline constexpr double kDefaultTexelsPerMeter = 32;

@@ -42,6 +42,7 @@ Vec3 Surfaces::corner_normal(std::uint32_t triangle, int corner) const {
 }
 
 Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
+  if (!mean_reflectances.empty()) return mean_reflectances[p.triangle];
   const Material& own = material(p.triangle);
   const Vec3 reflectance = textured(*this, p, own.reflectance, own.reflectance_texture);
   const std::vector<Vec3>& colors = mesh(p.triangle).colors;
@@ -49,6 +50,10 @@ Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
 }
 
 Vec3 Surfaces::exitance(const SurfacePoint& p) const {
+  return effects.has(Effect::kTexturedEmission) ? exitance_in_detail(p) : exitances[p.triangle];
+}
+
+Vec3 Surfaces::exitance_in_detail(const SurfacePoint& p) const {
   const Material& own = material(p.triangle);
   return textured(*this, p, own.emissive, own.emissive_texture) * std::numbers::pi;
 }

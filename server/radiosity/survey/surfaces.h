@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/base/sequence.h"
 #include "common/geometry/vector.h"
 #include "common/scene/scene.h"
+#include "server/radiosity/survey/effects.h"
 
 namespace radbake::radiosity {
 
@@ -26,6 +28,12 @@ struct SurfacePoint {
 class Surfaces {
  public:
   const Scene* scene = nullptr;
+  EffectSet effects = EffectSet::all();
+  // As they are simulated: what an effect that is off would do is taken out.
+  std::vector<Material> materials;
+  std::vector<Light> lights;
+  Vec3 sky;                                   ///< luminance, nit
+  const TexturePlane* environment = nullptr;  ///< null: none
   Vec3 centre;
   double metres_per_unit = 1;
 
@@ -37,13 +45,14 @@ class Surfaces {
   std::vector<double> ray_offsets;       ///< how far ray origins are lifted off the surface
   std::vector<Vec3> exitances;           ///< E = pi L, mean over the triangle, lx
   std::vector<std::uint8_t> is_emitter;  ///< small and bright: lights by sampling, E_out of the rows
+  std::vector<Vec3> mean_reflectances;   ///< where Effect::kTexturedReflectance is off, else empty
 
   std::size_t size() const { return corners.size(); }
   const Mesh& mesh(std::uint32_t triangle) const { return scene->meshes[meshes[triangle]]; }
   const std::array<std::uint32_t, 3>& vertices(std::uint32_t triangle) const {
     return mesh(triangle).triangles[in_mesh[triangle]];
   }
-  const Material& material(std::uint32_t triangle) const { return scene->materials[mesh(triangle).material]; }
+  const Material& material(std::uint32_t triangle) const { return materials[mesh(triangle).material]; }
 
   Vec3 position(const SurfacePoint& p) const {
     const auto& c = corners[p.triangle];
@@ -53,10 +62,16 @@ class Surfaces {
   Vec3 shading_normal(const SurfacePoint& p) const;
   /// NORMAL at a corner (0..2), unit length, or the geometric one where the mesh has none.
   Vec3 corner_normal(std::uint32_t triangle, int corner) const;
+  /// Leaves out what an effect that is not in the set would do, and finds the emitters among what is left.
+  void simulate(const EffectSet& set);
   /// Reflectance there: factor times texture times the vertices' colours, each channel in [0, 1).
   Vec3 reflectance(const SurfacePoint& p) const;
   /// Exitance there: pi times factor times texture, lx.
   Vec3 exitance(const SurfacePoint& p) const;
+
+ private:
+  Vec3 exitance_in_detail(const SurfacePoint& p) const;
+  void find_emitters(const SobolPoints& points);
 };
 
 }  // namespace radbake::radiosity

@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/sequence.h"
 #include "server/radiosity/survey/scene_checks.h"
 
 namespace radbake::radiosity {
 namespace {
-
-/// Points that a textured triangle's mean emission is taken over.
-constexpr int kEmissionSamples = 64;
 
 struct Bounds {
   Vec3 low, high;
@@ -70,45 +66,17 @@ void list_triangles(const Scene& scene, SurveyedScene& out) {
   }
 }
 
-/// Mean exitance over a triangle: constant, or over a net of points where a texture varies it.
-Vec3 mean_exitance(const Surfaces& surfaces, std::uint32_t triangle, const SobolPoints& points) {
-  const Material& material = surfaces.material(triangle);
-  if (max_component(material.emissive) <= 0) return {};
-  if (!material.emissive_texture) return surfaces.exitance({triangle, 0, 0});
-  Vec3 sum;
-  for (int i = 0; i < kEmissionSamples; ++i) {
-    const auto seeds = SobolPoints::seeds_of(triangle);
-    double u = points.coordinate(i, 0, seeds), v = points.coordinate(i, 1, seeds);
-    if (u + v > 1) u = 1 - u, v = 1 - v;
-    sum += surfaces.exitance({triangle, u, v});
-  }
-  return sum / kEmissionSamples;
-}
-
-/// Finds what glows, and which of it is small and bright against the scene's area mean.
-void find_emitters(SurveyedScene& out) {
-  Surfaces& surfaces = out.surfaces;
-  const SobolPoints points(kEmissionSamples);
-  double area = 0, flux = 0;
-  surfaces.exitances.resize(surfaces.size());
-  surfaces.is_emitter.assign(surfaces.size(), 0);
+/// Counts what emits, and how much.
+void count_emitters(SurveyedScene& out) {
+  const Surfaces& surfaces = out.surfaces;
+  const double square_metres = surfaces.metres_per_unit * surfaces.metres_per_unit;
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
-    surfaces.exitances[t] = mean_exitance(surfaces, t, points);
     const int sides = surfaces.material(t).is_double_sided ? 2 : 1;
-    area += surfaces.areas[t] * sides;
-    flux += surfaces.areas[t] * sides * mean_component(surfaces.exitances[t]);
-  }
-  const double threshold = kEmitterThreshold * flux / area;
-  for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
-    const double exitance = mean_component(surfaces.exitances[t]);
-    if (exitance <= 0) continue;
-    surfaces.is_emitter[t] = exitance > threshold;
+    out.survey.area_m2 += surfaces.areas[t] * square_metres;
+    out.survey.emitted_lumens += surfaces.areas[t] * sides * mean_component(surfaces.exitances[t]) * square_metres;
+    if (max_component(surfaces.exitances[t]) <= 0) continue;
     ++(surfaces.is_emitter[t] ? out.survey.num_emitter_triangles : out.survey.num_glowing_triangles);
   }
-  const double square_metres = surfaces.metres_per_unit * surfaces.metres_per_unit;
-  out.survey.emitted_lumens = flux * square_metres;
-  out.survey.area_m2 = 0;
-  for (const double a : surfaces.areas) out.survey.area_m2 += a * square_metres;
 }
 
 }  // namespace
@@ -134,11 +102,12 @@ Result<SurveyedScene> survey_scene(const Scene& scene) {
     out.warnings.push_back({"triangles_dropped", std::to_string(survey.num_triangles_dropped) +
                                                      " triangles of zero area were dropped by the server"});
   }
-  find_emitters(out);
-  if (survey.emitted_lumens <= 0 && scene.lights.empty() && !survey.has_sky) {
+  out.surfaces.simulate(EffectSet::all());
+  count_emitters(out);
+  if (survey.emitted_lumens <= 0 && scene.lights.empty() && !survey.has_sky && !scene.environment) {
     return invalid_argument(
-        "the scene has no light: give a material an emissiveFactor, add a lamp (KHR_lights_punctual), or pass --sky or "
-        "--sun");
+        "the scene has no light: give a material an emissiveFactor, add a lamp (KHR_lights_punctual), or pass --sky, "
+        "--hdri or --sun");
   }
   return out;
 }

@@ -27,17 +27,15 @@ Vec3 sampled_texture(const TexturePlane& texture, Vec2 uv) {
   // Texel centres lie at half numbers.
   const double x = uv.x * texture.width - 0.5, y = uv.y * texture.height - 0.5;
   const double x0 = std::floor(x), y0 = std::floor(y);
-  Vec3 sum;
-  for (int dy = 0; dy < 2; ++dy) {
-    for (int dx = 0; dx < 2; ++dx) {
-      const double weight = (dx == 0 ? 1 - (x - x0) : x - x0) * (dy == 0 ? 1 - (y - y0) : y - y0);
-      const int column = wrapped(x0 + dx, texture.width, texture.wrap_s);
-      const int row = wrapped(y0 + dy, texture.height, texture.wrap_t);
-      const float* texel = &texture.values[(static_cast<std::size_t>(row) * texture.width + column) * texture.channels];
-      sum += Vec3{texel[0], texel[1], texel[2]} * weight;
-    }
-  }
-  return sum;
+  const auto texel = [&](int dx, int dy) {
+    const int column = wrapped(x0 + dx, texture.width, texture.wrap_s);
+    const int row = wrapped(y0 + dy, texture.height, texture.wrap_t);
+    const float* value = &texture.values[(static_cast<std::size_t>(row) * texture.width + column) * texture.channels];
+    return Vec3{value[0], value[1], value[2]};
+  };
+  // Between equal texels this form gives that value itself, to the last bit.
+  const auto between = [](Vec3 a, Vec3 b, double share) { return a + (b - a) * share; };
+  return between(between(texel(0, 0), texel(1, 0), x - x0), between(texel(0, 1), texel(1, 1), x - x0), y - y0);
 }
 
 }  // namespace radbake::radiosity

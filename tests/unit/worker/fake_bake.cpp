@@ -33,7 +33,9 @@ Tile fake_tile(int index) {
 
 }  // namespace
 
-Result<BakePlan> plan_scene(const Scene& scene, const BakeOptions&, std::stop_token) { return fake_plan(scene); }
+Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions&, std::stop_token) {
+  return PlannedBake{fake_plan(scene), {}};
+}
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
                                std::stop_token stop) {

@@ -39,6 +39,9 @@ Result<void> check_counts(const v1::SceneManifest& manifest, const v1::Limits& l
   for (const v1::Texture& texture : manifest.textures()) {
     RADBAKE_RETURN_IF_ERROR(check_texture(texture, limits.max_texture_pixels()));
   }
+  if (manifest.has_environment()) {
+    RADBAKE_RETURN_IF_ERROR(check_environment(manifest.environment(), limits.max_texture_pixels()));
+  }
   return {};
 }
 
@@ -100,6 +103,15 @@ Result<Scene> decode(const v1::SceneManifest& manifest, const BlobReader& read_b
     RADBAKE_ASSIGN_OR_RETURN(TexturePlane plane, decode_texture(blob, record));
     scene.textures.push_back(std::move(plane));
   }
+  if (manifest.has_environment()) {
+    if (!(scene.sky == Vec3{})) return invalid_argument("the scene has a constant sky and an environment: one of them");
+    const v1::Environment& record = manifest.environment();
+    RADBAKE_ASSIGN_OR_RETURN(
+        const std::string blob,
+        read_declared(record.blob(), "the environment '" + record.name() + "'", read_blob, limits));
+    RADBAKE_ASSIGN_OR_RETURN(scene.environment, decode_environment(blob, record));
+  }
+  scene.num_instances = manifest.num_instances();
   for (const v1::MeshRecord& record : manifest.meshes()) {
     RADBAKE_ASSIGN_OR_RETURN(const std::string blob,
                              read_declared(record.blob(), "mesh '" + record.name() + "'", read_blob, limits));

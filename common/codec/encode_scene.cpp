@@ -228,6 +228,12 @@ Result<EncodedScene> encode_scene(const Scene& scene, const EncodeOptions& optio
   for (const Material& material : scene.materials) *manifest.add_materials() = to_proto(material);
   for (const Light& light : scene.lights) *manifest.add_lights() = to_proto(light);
   if (!(scene.sky == Vec3{})) *manifest.mutable_sky() = rgb_to_proto(scene.sky);
+  if (scene.environment) {
+    RADBAKE_ASSIGN_OR_RETURN(std::string blob, encode_environment(*scene.environment));
+    *manifest.mutable_environment() = environment_to_proto(*scene.environment);
+    *manifest.mutable_environment()->mutable_blob() = blobs.add(std::move(blob));
+  }
+  manifest.set_num_instances(scene.num_instances);
 
   const v1::Digest digest = blobs.add(manifest.SerializeAsString());
   encoded.manifest = {digest.sha256(), digest.size_bytes()};

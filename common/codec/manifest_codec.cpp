@@ -12,6 +12,8 @@ namespace {
 
 // A direction may have been rounded to float32: relative 6e-8 a component, and to spare.
 constexpr double kUnitLengthTolerance = 1e-6;
+// What a sheet reflects and lets through are shares of one: rounded once to double, or once to float32 on the way.
+constexpr double kShareTolerance = 1e-6;
 
 std::string describe(double value) {
   std::ostringstream out;
@@ -24,6 +26,17 @@ std::string describe(Vec3 v) { return "(" + describe(v.x) + ", " + describe(v.y)
 
 Vec3 to_vec(const v1::Rgb& rgb) { return {rgb.r(), rgb.g(), rgb.b()}; }
 Vec3 to_vec(const v1::Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
+/// What goes straight through; absent: nothing. In each channel 0 to 1, and with the reflectance no more than 1.
+Result<Vec3> read_transmittance(const v1::Rgb& rgb, Vec3 reflectance, const std::string& owner) {
+  const Vec3 share = to_vec(rgb);
+  if (!is_finite(share) || min_component(share) < 0 || max_component(share) > 1) {
+    return invalid_argument(owner + " has transmittance " + describe(share) + ": each channel must be from 0 to 1");
+  }
+  if (max_component(reflectance + share) <= 1 + kShareTolerance) return share;
+  return invalid_argument(owner + " reflects " + describe(reflectance) + " and lets " + describe(share) +
+                          " through: more than 1 together");
+}
 
 /// A colour of light: finite and not negative. `owner` and `what` are for the message.
 Result<Vec3> read_light_color(const v1::Rgb& rgb, const std::string& owner, const char* what) {
@@ -111,6 +124,11 @@ v1::Material to_proto(const Material& material) {
   out.set_alpha_mode(static_cast<v1::AlphaMode>(material.alpha_mode));
   out.set_alpha(material.alpha);
   out.set_alpha_cutoff(material.alpha_cutoff);
+  if (!(material.transmittance == Vec3{})) *out.mutable_transmittance() = rgb_to_proto(material.transmittance);
+  out.set_is_specular(material.is_specular);
+  out.set_is_refractive(material.is_refractive);
+  out.set_has_normal_map(material.has_normal_map);
+  out.set_has_volume(material.has_volume);
   return out;
 }
 
@@ -133,6 +151,7 @@ v1::Light to_proto(const Light& light) {
         } else {
           *out.mutable_directional()->mutable_direction() = vector_to_proto(kind.direction);
           *out.mutable_directional()->mutable_illuminance() = rgb_to_proto(kind.illuminance);
+          out.mutable_directional()->set_angular_diameter_radians(kind.angular_diameter_radians);
         }
       },
       light.kind);
@@ -170,6 +189,11 @@ Result<Material> read_material(const v1::Material& material, int num_textures) {
     return invalid_argument(owner + " has alpha cutoff " + describe(out.alpha_cutoff) +
                             ": must be finite and not negative");
   }
+  RADBAKE_ASSIGN_OR_RETURN(out.transmittance, read_transmittance(material.transmittance(), out.reflectance, owner));
+  out.is_specular = material.is_specular();
+  out.is_refractive = material.is_refractive();
+  out.has_normal_map = material.has_normal_map();
+  out.has_volume = material.has_volume();
   return out;
 }
 
@@ -201,6 +225,11 @@ Result<Light> read_light(const v1::Light& light) {
     RADBAKE_ASSIGN_OR_RETURN(sun.direction, read_direction(light.directional().direction(), owner));
     RADBAKE_ASSIGN_OR_RETURN(sun.illuminance,
                              read_light_color(light.directional().illuminance(), owner, "illuminance"));
+    sun.angular_diameter_radians = light.directional().angular_diameter_radians();
+    if (!(sun.angular_diameter_radians >= 0 && sun.angular_diameter_radians < std::numbers::pi)) {
+      return invalid_argument(owner + " has an angular diameter of " + describe(sun.angular_diameter_radians) +
+                              " rad: must be at least 0 and below pi");
+    }
     out.kind = sun;
   } else {
     return invalid_argument(owner + " is of no kind that this version knows");

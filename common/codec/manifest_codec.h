@@ -14,10 +14,11 @@ v1::Light to_proto(const Light& light);
 v1::Rgb rgb_to_proto(Vec3 color);
 v1::Vector3 vector_to_proto(Vec3 v);
 
-/// Reflectance in [0, 1), emission finite and not negative, textures below num_textures.
+/// Reflectance in [0, 1), transmittance in [0, 1] and together at most 1 (to 1e-6), emission finite and not negative,
+/// textures below num_textures.
 Result<Material> read_material(const v1::Material& material, int num_textures);
 
-/// Finite values, directions of unit length, 0 <= inner cone <= outer cone <= pi/2.
+/// Finite values, directions of unit length, 0 <= inner cone <= outer cone <= pi/2, 0 <= angular diameter < pi.
 Result<Light> read_light(const v1::Light& light);
 
 /// Finite and not negative; absent: black.

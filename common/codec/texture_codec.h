@@ -22,4 +22,18 @@ Result<void> check_texture(const v1::Texture& texture, std::uint64_t max_pixels)
 /// Reads a blob whose record was checked. Values must be finite and not negative.
 Result<TexturePlane> decode_texture(const std::string& blob, const v1::Texture& texture);
 
+/// The blob of a sky of every direction, float32 x 3.
+///
+/// Errors: kInvalidArgument when it has not 3 channels, is not twice as wide as high, or its values are not as many.
+Result<std::string> encode_environment(const TexturePlane& plane);
+
+/// A sky's record but for the digest.
+v1::Environment environment_to_proto(const TexturePlane& plane);
+
+/// As check_texture(); its width must be twice its height.
+Result<void> check_environment(const v1::Environment& environment, std::uint64_t max_pixels);
+
+/// Reads a blob whose record was checked. Values must be finite and not negative.
+Result<TexturePlane> decode_environment(const std::string& blob, const v1::Environment& environment);
+
 }  // namespace radbake

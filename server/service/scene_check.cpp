@@ -9,6 +9,7 @@
 #include "radbake/v1/scene.pb.h"
 #include "server/service/convert.h"
 #include "server/service/status.h"
+#include "server/settings/to_options.h"
 
 namespace radbake::service {
 namespace {
@@ -41,6 +42,9 @@ grpc::Status check_settings(const v1::BakeSettings& settings, const v1::RunOptio
   if (!v1::Output_IsValid(settings.output())) {
     return bad_field("settings.output", std::to_string(settings.output()) + " is not an Output");
   }
+  if (const auto problem = settings::find_effect_problem(settings)) {
+    return bad_field(problem->field, problem->description);
+  }
   if (run.threads() > kMaxThreads) {
     return bad_field("run.threads", std::to_string(run.threads()) + " is above " + std::to_string(kMaxThreads));
   }
@@ -56,6 +60,8 @@ grpc::Status check_counts(const v1::SceneManifest& manifest, const Limits& limit
   for (const v1::Texture& texture : manifest.textures()) {
     num_pixels = std::max(num_pixels, std::uint64_t{texture.width()} * texture.height());
   }
+  const v1::Environment& sky = manifest.environment();
+  num_pixels = std::max(num_pixels, std::uint64_t{sky.width()} * sky.height());
   struct Count {
     const char* limit;
     std::uint64_t value, bound;
@@ -112,6 +118,10 @@ grpc::Status check_scene(const SceneRequest& request, const Limits& limits, std:
   for (const v1::Texture& texture : manifest.textures()) {
     if (auto status = add(texture.blob(), "texture '" + texture.name().substr(0, 100) + "'"); !status.ok())
       return status;
+  }
+  if (manifest.has_environment()) {
+    const v1::Environment& sky = manifest.environment();
+    if (auto status = add(sky.blob(), "environment '" + sky.name().substr(0, 100) + "'"); !status.ok()) return status;
   }
   const std::vector<Digest> missing = content.find_missing(work.inputs);
   if (!missing.empty()) return missing_blobs(missing);

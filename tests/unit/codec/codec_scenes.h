@@ -73,4 +73,13 @@ inline Scene sheet_scene(int n = 8) {
   return scene;
 }
 
+/// The same under a sky of 4 x 2 directions, all of different light.
+inline Scene environment_scene() {
+  Scene scene = sheet_scene();
+  scene.sky = {};
+  scene.environment = TexturePlane{.name = "dawn", .width = 4, .height = 2, .channels = 3, .values = {}};
+  for (int i = 0; i < 24; ++i) scene.environment->values.push_back(0.25F * static_cast<float>(i));
+  return scene;
+}
+
 }  // namespace radbake

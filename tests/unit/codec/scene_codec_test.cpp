@@ -71,6 +71,63 @@ TEST(SceneCodec, KeepsMaterialsTexturesLightsAndSky) {
   EXPECT_EQ(decoded->sky, (Vec3{5, 6, 7}));
 }
 
+TEST(SceneCodec, KeepsSheetsFlagsSunsDiscAndInstances) {
+  Scene scene = sheet_scene();
+  scene.materials[0].transmittance = {0.5, 0.25, 0.125};
+  scene.num_instances = 12;
+  std::get<DirectionalLight>(scene.lights[2].kind).angular_diameter_radians = 0.00925;
+  // One flag at a time: none may stand for another.
+  for (bool Material::*flag :
+       {&Material::is_specular, &Material::is_refractive, &Material::has_normal_map, &Material::has_volume}) {
+    Scene flagged = scene;
+    flagged.materials[0].*flag = true;
+    const auto encoded = encode_scene(flagged, {});
+    ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+    const auto decoded = decode_encoded(*encoded);
+    ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+    const Material &before = flagged.materials[0], &after = decoded->materials.at(0);
+    EXPECT_EQ(after.transmittance, before.transmittance);
+    EXPECT_EQ(after.is_specular, before.is_specular);
+    EXPECT_EQ(after.is_refractive, before.is_refractive);
+    EXPECT_EQ(after.has_normal_map, before.has_normal_map);
+    EXPECT_EQ(after.has_volume, before.has_volume);
+    EXPECT_EQ(std::get<DirectionalLight>(decoded->lights[2].kind).angular_diameter_radians, 0.00925);
+    EXPECT_EQ(decoded->num_instances, 12U);
+  }
+}
+
+TEST(SceneCodec, KeepsASkyOfEveryDirection) {
+  const Scene scene = environment_scene();
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+  EXPECT_EQ(encoded->blobs.size(), 5U);  // a mesh, two textures, the sky, the manifest
+  const auto decoded = decode_encoded(*encoded);
+  ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+  ASSERT_TRUE(decoded->environment.has_value());
+  EXPECT_EQ(decoded->environment->name, "dawn");
+  EXPECT_EQ(decoded->environment->width, 4);
+  EXPECT_EQ(decoded->environment->height, 2);
+  EXPECT_EQ(decoded->environment->channels, 3);
+  EXPECT_EQ(decoded->environment->values, scene.environment->values);
+  EXPECT_EQ(decoded->sky, Vec3{});
+}
+
+TEST(SceneCodec, ReadsManifestsOfTheTimeBeforeSheetsAndSkies) {
+  v1::SceneManifest manifest;
+  EncodedScene encoded = *encode_scene(sheet_scene(), {});
+  ASSERT_TRUE(manifest.ParseFromString(encoded.blobs.back().bytes));
+  // What was not there then is not sent: such scenes keep their bytes, and so their digests.
+  EXPECT_FALSE(manifest.materials(0).has_transmittance());
+  EXPECT_FALSE(manifest.has_environment());
+  const auto decoded = decode_encoded(encoded);
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_EQ(decoded->materials[0].transmittance, Vec3{});
+  EXPECT_FALSE(decoded->materials[0].is_specular || decoded->materials[0].has_volume);
+  EXPECT_EQ(std::get<DirectionalLight>(decoded->lights[2].kind).angular_diameter_radians, 0);
+  EXPECT_FALSE(decoded->environment.has_value());
+  EXPECT_EQ(decoded->num_instances, 0U);
+}
+
 TEST(SceneCodec, EncodesTheSameSceneToTheSameBytes) {
   const auto first = encode_scene(sheet_scene(), {}), second = encode_scene(sheet_scene(), {});
   ASSERT_TRUE(first.ok() && second.ok());
@@ -443,6 +500,15 @@ TEST(SceneCodec, RefusesToEncodeWhatIsNoScene) {
   scene = sheet_scene();
   for (Vec3& position : scene.meshes[0].positions) position.y = 0, position.z = 0;
   EXPECT_THAT(message_of(scene), HasSubstr("no triangle with an area"));
+  scene = environment_scene();
+  scene.environment->channels = 4;
+  EXPECT_THAT(message_of(scene), HasSubstr("the environment 'dawn' has 4 channels: must be 3"));
+  scene = environment_scene();
+  scene.environment->height = 1;
+  EXPECT_THAT(message_of(scene), HasSubstr("the environment 'dawn' is 4 x 1 pixels: must be twice as wide as high"));
+  scene = environment_scene();
+  scene.environment->values.pop_back();
+  EXPECT_THAT(message_of(scene), HasSubstr("the environment 'dawn' has 23 values, its size needs 24"));
 }
 
 TEST(Grid, HoldsEveryIndexOfItsExtentExactly) {

@@ -27,8 +27,8 @@ v1::SceneManifest manifest_of(const EncodedScene& encoded) {
 
 /// Decodes a scene whose manifest was changed; blobs stay.
 Result<Scene> decode_changed(const std::function<void(v1::SceneManifest&)>& change,
-                             const v1::Limits& limits = default_limits()) {
-  EncodedScene encoded = *encode_scene(sheet_scene(), {});
+                             const v1::Limits& limits = default_limits(), const Scene& scene = sheet_scene()) {
+  EncodedScene encoded = *encode_scene(scene, {});
   v1::SceneManifest manifest = manifest_of(encoded);
   change(manifest);
   encoded.blobs.back().bytes = manifest.SerializeAsString();
@@ -47,7 +47,7 @@ Result<Scene> decode_blob(const std::string& bytes, v1::MeshRecord record) {
   v1::SceneManifest manifest;
   *manifest.add_meshes() = record;
   manifest.add_materials()->mutable_reflectance()->set_r(0.5);
-  encoded.blobs.push_back({{}, manifest.SerializeAsString()});
+  encoded.blobs.emplace_back().bytes = manifest.SerializeAsString();
   return decode_encoded(encoded);
 }
 
@@ -258,6 +258,18 @@ TEST(UntrustedScene, ChecksEveryValueOfTheManifest) {
        "light 'sun' has direction (0, nan, 0)"},
       {[](M& m) { m.mutable_lights(2)->mutable_directional()->mutable_illuminance()->set_g(-1); },
        "light 'sun' has illuminance (1000, -1, 800)"},
+      {[=](M& m) { m.mutable_lights(2)->mutable_directional()->set_angular_diameter_radians(nan); },
+       "light 'sun' has an angular diameter of nan rad"},
+      {[](M& m) { m.mutable_lights(2)->mutable_directional()->set_angular_diameter_radians(-0.5); },
+       "light 'sun' has an angular diameter of -0.5 rad"},
+      {[](M& m) { m.mutable_lights(2)->mutable_directional()->set_angular_diameter_radians(3.1416); },
+       "light 'sun' has an angular diameter of 3.1416 rad"},
+      {[](M& m) { m.mutable_materials(0)->mutable_transmittance()->set_g(-0.1); },
+       "material 'paint' has transmittance (0, -0.1, 0)"},
+      {[=](M& m) { m.mutable_materials(0)->mutable_transmittance()->set_b(nan); },
+       "material 'paint' has transmittance (0, 0, nan)"},
+      {[](M& m) { m.mutable_materials(0)->mutable_transmittance()->set_b(0.2501); },
+       "material 'paint' reflects (0.25, 0.5, 0.75) and lets (0, 0, 0.2501) through: more than 1 together"},
   };
   for (const Case& c : cases) EXPECT_THAT(message_of(decode_changed(c.change)), HasSubstr(c.message));
 }
@@ -268,6 +280,51 @@ TEST(UntrustedScene, RefusesTexelsThatAreNoLight) {
     scene.textures[0].values[4] = bad;
     EXPECT_THAT(message_of(decode_encoded(*encode_scene(scene, {}))), HasSubstr("at pixel (1, 0)"));
   }
+}
+
+TEST(UntrustedScene, ChecksEveryValueOfASky) {
+  using M = v1::SceneManifest;
+  struct Case {
+    std::function<void(M&)> change;
+    const char* message;
+  };
+  const Case cases[] = {
+      {[](M& m) { m.mutable_environment()->set_width(0); }, "the environment 'dawn' is 0 x 2 pixels: it has none"},
+      {[](M& m) { m.mutable_environment()->set_height(3); },
+       "the environment 'dawn' has a blob of 96 bytes, 4 x 3 x 3 floats are 144"},
+      {[](M& m) { m.mutable_environment()->set_width(2), m.mutable_environment()->set_height(4); },
+       "the environment 'dawn' is 2 x 4 pixels: must be twice as wide as high"},
+      {[](M& m) { m.mutable_environment()->set_width(0xffffffff), m.mutable_environment()->set_height(0xffffffff); },
+       "max_texture_pixels"},
+      {[](M& m) { m.mutable_environment()->mutable_blob()->set_sha256("../x"); }, "the environment 'dawn': "},
+      {[](M& m) { *m.mutable_environment()->mutable_blob() = m.textures(0).blob(); },
+       "the environment 'dawn' has a blob of 24 bytes"},
+      {[](M& m) { m.mutable_sky()->set_g(1); }, "the scene has a constant sky and an environment"},
+  };
+  for (const Case& c : cases) {
+    EXPECT_THAT(message_of(decode_changed(c.change, default_limits(), environment_scene())), HasSubstr(c.message));
+  }
+  v1::Limits limits = default_limits();
+  limits.set_max_texture_pixels(7);
+  EXPECT_EQ(message_of(decode_changed([](M&) {}, limits, environment_scene())),
+            "the environment 'dawn' is 4 x 2 = 8 pixels; max_texture_pixels is 7");
+}
+
+TEST(UntrustedScene, RefusesSkiesThatAreNoLight) {
+  for (const float bad : {-1.0F, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    Scene scene = environment_scene();
+    scene.environment->values[16] = bad;
+    EXPECT_THAT(message_of(decode_encoded(*encode_scene(scene, {}))),
+                HasSubstr("the environment 'dawn' has the value"));
+    EXPECT_THAT(message_of(decode_encoded(*encode_scene(scene, {}))), HasSubstr("at pixel (1, 1)"));
+  }
+}
+
+TEST(UntrustedScene, LetsSharesOfOneBeRounded) {
+  // 0.75 + 0.25 as float32 arithmetic may leave it.
+  const auto scene =
+      decode_changed([](v1::SceneManifest& m) { m.mutable_materials(0)->mutable_transmittance()->set_b(0.25 + 1e-7); });
+  EXPECT_TRUE(scene.ok()) << message_of(scene);
 }
 
 TEST(UntrustedScene, RefusesBytesThatAreNoManifest) {
@@ -329,7 +386,7 @@ TEST(UntrustedScene, SurvivesThousandsOfMutatedMeshes) {
 TEST(UntrustedScene, SurvivesThousandsOfMutatedManifests) {
   const google::protobuf::LogSilencer silencer;
   std::mt19937 random(4202);
-  const EncodedScene encoded = *encode_scene(sheet_scene(4), {});
+  const EncodedScene encoded = *encode_scene(environment_scene(), {});
   int num_refused = 0;
   for (int i = 0; i < 3000; ++i) {
     EncodedScene changed = encoded;
@@ -340,7 +397,13 @@ TEST(UntrustedScene, SurvivesThousandsOfMutatedManifests) {
       ++num_refused;
       continue;
     }
-    for (const Material& material : decoded->materials) ASSERT_LT(max_component(material.reflectance), 1);
+    for (const Material& material : decoded->materials) {
+      ASSERT_LT(max_component(material.reflectance), 1);
+      ASSERT_LE(max_component(material.reflectance + material.transmittance), 1 + 1e-6);
+    }
+    if (decoded->environment) {
+      ASSERT_EQ(decoded->environment->width, 2 * decoded->environment->height);
+    }
     for (const Mesh& mesh : decoded->meshes) ASSERT_LT(mesh.material, static_cast<int>(decoded->materials.size()));
   }
   EXPECT_GT(num_refused, 1000);

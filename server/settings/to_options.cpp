@@ -1,6 +1,9 @@
 #include "server/settings/to_options.h"
 
+#include <cmath>
 #include <optional>
+#include <set>
+#include <string>
 
 namespace radbake::settings {
 namespace {
@@ -61,8 +64,54 @@ radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::Ru
   options.transport = to_transport(settings.transport());
   options.solver = to_solver(settings.solver());
   options.transport_memory = settings.transport_memory_bytes();
+  for (const v1::EffectOverride& change : settings.effects()) {
+    const auto effect = radiosity::effect_by_name(change.effect());
+    if (effect && change.choice() == v1::EFFECT_CHOICE_ON) options.effects[*effect] = true;
+    if (effect && change.choice() == v1::EFFECT_CHOICE_OFF) options.effects[*effect] = false;
+  }
+  for (const int layer : settings.layers()) {
+    options.wants_direct |= layer == v1::EXTRA_LAYER_DIRECT;
+    options.wants_indirect |= layer == v1::EXTRA_LAYER_INDIRECT;
+    options.wants_ao |= layer == v1::EXTRA_LAYER_AO;
+  }
+  options.ao_distance = settings.ao_distance();
   options.threads = static_cast<int>(run.threads());
   return options;
+}
+
+radiosity::HostCosts to_costs(const v1::HostCosts& costs) {
+  return {costs.row_ray(),  costs.texel_ray(),  costs.light_ray(), costs.row(),
+          costs.receiver(), costs.entry_step(), costs.entry()};
+}
+
+std::optional<FieldProblem> find_effect_problem(const v1::BakeSettings& settings) {
+  constexpr double kMaxDistance = 1e6;
+  std::set<std::string> names;
+  for (const v1::EffectOverride& change : settings.effects()) {
+    const std::string shown = "'" + change.effect().substr(0, 40) + "'";
+    if (!radiosity::effect_by_name(change.effect())) {
+      std::string all;
+      for (const std::string_view name : radiosity::kEffectNames) all += (all.empty() ? "" : " ") + std::string(name);
+      return FieldProblem{"settings.effects", shown + " is not an effect; there are " + all};
+    }
+    if (!names.insert(change.effect()).second) {
+      return FieldProblem{"settings.effects", shown + " is chosen more than once"};
+    }
+    if (!v1::EffectChoice_IsValid(change.choice())) {
+      return FieldProblem{"settings.effects",
+                          shown + ": " + std::to_string(change.choice()) + " is not an EffectChoice"};
+    }
+  }
+  for (const int layer : settings.layers()) {
+    if (!v1::ExtraLayer_IsValid(layer) || layer == v1::EXTRA_LAYER_UNSPECIFIED) {
+      return FieldProblem{"settings.layers", std::to_string(layer) + " is not an ExtraLayer"};
+    }
+  }
+  if (!(settings.ao_distance() >= 0 && settings.ao_distance() <= kMaxDistance)) {
+    return FieldProblem{"settings.ao_distance",
+                        std::to_string(settings.ao_distance()) + " is not between 0 and 1000000"};
+  }
+  return std::nullopt;
 }
 
 }  // namespace radbake::settings

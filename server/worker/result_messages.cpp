@@ -30,6 +30,45 @@ v1::Survey to_message(const radiosity::Survey& survey) {
   out.set_max_reflectance(survey.max_reflectance);
   out.set_extent_m(survey.extent_m);
   out.set_has_sky(survey.has_sky);
+  out.set_min_reflectance(survey.min_reflectance);
+  out.set_num_instances(survey.num_instances);
+  out.set_is_grey(survey.is_grey);
+  out.set_is_convex(survey.is_convex);
+  out.set_is_closed(survey.is_closed);
+  out.set_escape_share(survey.escape_share);
+  out.set_escape_share_interval(survey.escape_share_interval);
+  out.set_num_probe_rays(survey.num_probe_rays);
+  out.set_area_masked_m2(survey.area_masked_m2);
+  out.set_area_tinted_m2(survey.area_tinted_m2);
+  out.set_area_double_sided_m2(survey.area_double_sided_m2);
+  out.set_area_specular_m2(survey.area_specular_m2);
+  out.set_area_refractive_m2(survey.area_refractive_m2);
+  out.set_area_normal_mapped_m2(survey.area_normal_mapped_m2);
+  out.set_area_volume_m2(survey.area_volume_m2);
+  out.set_num_textures_flat(survey.num_textures_flat);
+  out.set_lamp_lumens(survey.lamp_lumens);
+  for (const std::string& mesh : survey.brightest_emitters) out.add_brightest_emitters(mesh);
+  return out;
+}
+
+v1::EffectPlan to_message(const radiosity::EffectPlan& effect) {
+  v1::EffectPlan out;
+  out.set_effect(std::string(radiosity::effect_name(effect.effect)));
+  out.set_state(radiosity::effect_state_name(effect.state));
+  out.set_reason(effect.reason);
+  out.set_value(effect.value);
+  out.set_is_forced(effect.is_forced);
+  return out;
+}
+
+v1::StagePrediction to_message(const radiosity::StagePrediction& stage) {
+  v1::StagePrediction out;
+  out.set_stage(stage.stage);
+  out.set_cpu_seconds(stage.cpu_seconds);
+  out.set_cpu_seconds_low(stage.cpu_seconds_low);
+  out.set_cpu_seconds_high(stage.cpu_seconds_high);
+  out.set_wall_seconds(stage.wall_seconds);
+  out.set_memory_bytes(stage.memory_bytes);
   return out;
 }
 
@@ -154,7 +193,45 @@ v1::Plan to_message(const radiosity::BakePlan& plan) {
   out.set_transport_bytes(plan.transport_bytes);
   out.set_transport_bytes_limit(plan.transport_bytes_limit);
   out.set_texels_per_meter(plan.texels_per_meter);
+  for (const radiosity::EffectPlan& effect : plan.effects) *out.add_effects() = to_message(effect);
+  out.set_num_channels(static_cast<std::uint32_t>(plan.num_channels));
+  out.set_estimator_reason(plan.form_factors_reason);
+  out.set_transport_reason(plan.transport_reason);
+  out.set_solver_reason(plan.solver_reason);
   for (const Warning& warning : plan.warnings) *out.add_warnings() = to_message(warning);
+  return out;
+}
+
+v1::Prediction to_message(const radiosity::Prediction& prediction) {
+  v1::Prediction out;
+  for (const radiosity::StagePrediction& stage : prediction.stages) *out.add_stages() = to_message(stage);
+  *out.mutable_total() = to_message(prediction.total);
+  for (const radiosity::MeshPrediction& mesh : prediction.costliest) {
+    v1::MeshPrediction& to = *out.add_costliest();
+    to.set_mesh(mesh.mesh);
+    to.set_cpu_seconds(mesh.cpu_seconds);
+    to.set_num_texels(mesh.num_texels);
+    to.set_num_patches(mesh.num_patches);
+  }
+  for (const radiosity::EffectSeconds& effect : prediction.effects) {
+    v1::EffectSeconds& to = *out.add_effects();
+    to.set_effect(std::string(radiosity::effect_name(effect.effect)));
+    to.set_cpu_seconds(effect.cpu_seconds);
+  }
+  out.set_source(prediction.source);
+  out.set_pilot_seconds(prediction.pilot_seconds);
+  return out;
+}
+
+v1::HostCosts to_message(const radiosity::HostCosts& costs) {
+  v1::HostCosts out;
+  out.set_row_ray(costs.row_ray);
+  out.set_texel_ray(costs.texel_ray);
+  out.set_light_ray(costs.light_ray);
+  out.set_row(costs.row);
+  out.set_receiver(costs.receiver);
+  out.set_entry_step(costs.entry_step);
+  out.set_entry(costs.entry);
   return out;
 }
 

@@ -11,7 +11,10 @@ namespace radbake::worker {
 
 /// The library's plain structs to the wire, field for field.
 
+/// Without the prediction.
 v1::Plan to_message(const radiosity::BakePlan& plan);
+v1::Prediction to_message(const radiosity::Prediction& prediction);
+v1::HostCosts to_message(const radiosity::HostCosts& costs);
 v1::Progress to_message(const radiosity::BakeProgress& progress);
 v1::LayerTile to_message(const radiosity::Tile& tile);
 /// Without the blob, which is named when it has been sent.

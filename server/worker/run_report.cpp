@@ -10,6 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "server/radiosity/bake/cpu_clock.h"
+
 namespace radbake::worker {
 
 double seconds_since_process_start() {
@@ -32,11 +34,13 @@ void StageClock::begin(const std::string& stage) {
   end();
   running_ = stage;
   began_at_ = Clock::now();
+  cpu_began_at_ = radiosity::process_cpu_seconds();
 }
 
 void StageClock::end() {
   if (running_.empty()) return;
-  stages_.push_back({std::exchange(running_, ""), std::chrono::duration<double>(Clock::now() - began_at_).count()});
+  stages_.push_back({std::exchange(running_, ""), std::chrono::duration<double>(Clock::now() - began_at_).count(),
+                     radiosity::process_cpu_seconds() - cpu_began_at_});
 }
 
 v1::RunReport run_report(const WorkerIdentity& identity, const std::vector<radiosity::StageTime>& stages,
@@ -46,6 +50,9 @@ v1::RunReport run_report(const WorkerIdentity& identity, const std::vector<radio
     v1::StageSeconds& stage = *run.add_stages();
     stage.set_stage(time.stage);
     stage.set_seconds(time.seconds);
+    v1::StageSeconds& cpu = *run.add_cpu_stages();
+    cpu.set_stage(time.stage);
+    cpu.set_seconds(time.cpu_seconds);
   }
   run.set_wall_seconds(wall_seconds);
 

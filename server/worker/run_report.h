@@ -19,7 +19,7 @@ struct WorkerIdentity {
 /// Seconds since the kernel created this process, in its ticks of 10 ms; 0 where /proc does not tell.
 double seconds_since_process_start();
 
-/// Takes the time of the stages that the worker adds to those of the bake.
+/// Takes the wall and CPU time of the stages that the worker adds to those of the bake.
 class StageClock {
  public:
   /// Ends the running stage and begins another.
@@ -32,6 +32,7 @@ class StageClock {
   using Clock = std::chrono::steady_clock;
   std::string running_;
   Clock::time_point began_at_;
+  double cpu_began_at_ = 0;
   std::vector<radiosity::StageTime> stages_;
 };
 

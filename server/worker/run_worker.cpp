@@ -127,13 +127,19 @@ Result<v1::BakeResult> send_result(const radiosity::BakeOutcome& outcome, v1::Pr
   return result;
 }
 
+radiosity::BakeOptions options_of(const v1::StartWork& start) {
+  radiosity::BakeOptions options = settings::to_options(start.settings(), start.run());
+  options.costs = settings::to_costs(start.costs());
+  return options;
+}
+
 Result<v1::WorkerReport> plan(const v1::StartWork& start, ReportStream& stream) {
   RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
-  RADBAKE_ASSIGN_OR_RETURN(
-      const radiosity::PlannedBake planned,
-      radiosity::plan_scene(scene, settings::to_options(start.settings(), start.run()), stream.stop_token()));
+  RADBAKE_ASSIGN_OR_RETURN(const radiosity::PlannedBake planned,
+                           radiosity::plan_scene(scene, options_of(start), stream.stop_token()));
   v1::WorkerReport report;
   *report.mutable_plan_finished() = to_message(planned.plan);
+  *report.mutable_plan_finished()->mutable_prediction() = to_message(planned.prediction);
   return report;
 }
 
@@ -144,7 +150,7 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
   before.end();
 
-  const radiosity::BakeOptions options = settings::to_options(start.settings(), start.run());
+  const radiosity::BakeOptions options = options_of(start);
   StreamObserver observer(stream);
   const auto bake_began_at = Clock::now();
   RADBAKE_ASSIGN_OR_RETURN(const radiosity::BakeOutcome outcome,
@@ -165,6 +171,8 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   report = to_message(outcome.report);
   report.set_engine_version(kEngineVersion);
   *report.mutable_run() = run_report(identity, stages, seconds_since(began_at), static_cast<std::uint32_t>(threads));
+  *report.mutable_run()->mutable_prediction() = to_message(outcome.report.prediction);
+  *report.mutable_run()->mutable_costs() = to_message(outcome.report.costs);
   const std::uint64_t num_rays = report.num_row_rays() + report.num_gather_rays() + report.num_light_rays();
   report.mutable_run()->set_rays_per_second(static_cast<double>(num_rays) / bake_seconds);
   v1::WorkerReport finished;

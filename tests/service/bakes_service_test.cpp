@@ -162,6 +162,15 @@ TEST_F(BakesServiceTest, NamesTheFieldThatIsOutOfRange) {
   request.mutable_settings()->set_rays(1'000'000);
   EXPECT_EQ(refused_field(request), "settings.rays");
   request = client_.request_for(manifest, kSucceed);
+  request.mutable_settings()->add_effects()->set_effect("caustics");
+  EXPECT_EQ(refused_field(request), "settings.effects");
+  request = client_.request_for(manifest, kSucceed);
+  request.mutable_settings()->add_layers(v1::EXTRA_LAYER_UNSPECIFIED);
+  EXPECT_EQ(refused_field(request), "settings.layers");
+  request = client_.request_for(manifest, kSucceed);
+  request.mutable_settings()->set_ao_distance(-1);
+  EXPECT_EQ(refused_field(request), "settings.ao_distance");
+  request = client_.request_for(manifest, kSucceed);
   request.clear_request_id();
   EXPECT_EQ(refused_field(request), "request_id");
   request = client_.request_for(manifest, kSucceed);

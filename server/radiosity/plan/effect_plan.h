@@ -17,7 +17,15 @@ enum class EffectState {
   kUnsupported,  ///< in the scene, and not simulated
 };
 /// "absent", "off", "on", "unsupported".
-const char* effect_state_name(EffectState state);
+inline const char* effect_state_name(EffectState state) {
+  switch (state) {
+    case EffectState::kAbsent: return "absent";
+    case EffectState::kOff: return "off";
+    case EffectState::kOn: return "on";
+    case EffectState::kUnsupported: return "unsupported";
+  }
+  return "unknown";
+}
 
 /// What a bake does of an effect. Field for field radbake.v1.EffectPlan.
 struct EffectPlan {
@@ -31,8 +39,9 @@ struct EffectPlan {
 /// Overrides by a user: true is on, false off; what is not in it is decided by the scene.
 using EffectOverrides = std::map<Effect, bool>;
 
-/// What a user asks for that is an effect of its own.
+/// What a user asks for that is an effect of its own, or would be left of it.
 struct AskedOutputs {
+  bool lightmaps = true;
   bool vertices = false, layers = false, ambient_occlusion = false;
 };
 

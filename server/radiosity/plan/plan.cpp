@@ -27,6 +27,7 @@ Result<void> check_options(const BakeOptions& options) {
   RADBAKE_RETURN_IF_ERROR(check_range("texels per metre", options.texels_per_meter, 1e-6, 1e9));
   RADBAKE_RETURN_IF_ERROR(check_range("rays", options.rays, kMinRays, kMaxRays));
   RADBAKE_RETURN_IF_ERROR(check_range("max patches", options.max_patches, kMinMaxPatches, 1 << 24));
+  RADBAKE_RETURN_IF_ERROR(check_range("ambient occlusion distance", options.ao_distance, 1e-6, 1e9));
   RADBAKE_RETURN_IF_ERROR(check_range("threads", options.threads, 1, 4096));
   RADBAKE_RETURN_IF_ERROR(
       check_range("transport memory", options.transport_memory, std::uint64_t{1} << 10, std::uint64_t{1} << 50));

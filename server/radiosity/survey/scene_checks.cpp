@@ -77,6 +77,16 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
     return invalid_argument(name + ": emissive luminance " + in_words(material.emissive) +
                             " nit is not within [0, inf)");
   }
+  // What was rounded on its way here may add up to a little more than one.
+  constexpr double kRounding = 1e-6;
+  const Vec3 passed_on = material.reflectance + material.transmittance;
+  if (!is_finite(material.transmittance) || min_component(material.transmittance) < 0 ||
+      max_component(material.transmittance) > 1) {
+    return invalid_argument(name + ": transmittance " + in_words(material.transmittance) + " is not within [0, 1]");
+  }
+  if (max_component(passed_on) > 1 + kRounding) {
+    return invalid_argument(name + ": reflectance + transmittance reaches " + in_words(passed_on) + ", above 1");
+  }
   for (const auto& reference : {material.reflectance_texture, material.emissive_texture}) {
     if (!reference) continue;
     if (reference->texture < 0 || static_cast<std::size_t>(reference->texture) >= scene.textures.size()) {
@@ -105,6 +115,11 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
     const Vec3 product = scaled_by(material.reflectance, brightest);
     if (max_component(product) >= 1) {
       return invalid_argument(name + ": reflectance times texture reaches " + in_words(product) + ", not below 1");
+    }
+    const Vec3 both = scaled_by(passed_on, brightest);
+    if (max_component(both) > 1 + kRounding) {
+      return invalid_argument(name + ": reflectance + transmittance times texture reaches " + in_words(both) +
+                              ", above 1");
     }
   }
   return {};
@@ -159,6 +174,33 @@ Result<void> check_light(const Scene& scene, std::size_t i) {
     if (!is_direction(sun->direction)) return invalid_argument(name + ": direction is not of unit length");
     if (!is_amount(sun->illuminance))
       return invalid_argument(name + ": illuminance " + in_words(sun->illuminance) + " lx");
+    const double diameter = sun->angular_diameter_radians;
+    if (!(diameter >= 0 && diameter < std::numbers::pi)) {
+      return invalid_argument(name + ": angular diameter " + std::to_string(diameter) + " is not within [0, pi)");
+    }
+  }
+  return {};
+}
+
+Result<void> check_environment(const Scene& scene) {
+  const TexturePlane& sky = *scene.environment;
+  const std::string name = "environment '" + sky.name + "'";
+  if (!(scene.sky == Vec3{})) {
+    return invalid_argument(name + " and a constant sky of " + in_words(scene.sky) + " nit exclude each other");
+  }
+  const std::string size = std::to_string(sky.width) + " x " + std::to_string(sky.height);
+  if (sky.height < 1 || sky.width != 2 * sky.height) {
+    return invalid_argument(name + ": " + size + " pixels are not twice as wide as high");
+  }
+  if (sky.channels != 3 || sky.values.size() != static_cast<std::size_t>(sky.width) * sky.height * 3) {
+    return invalid_argument(name + ": " + std::to_string(sky.values.size()) + " values for " + size + " x 3");
+  }
+  for (std::size_t at = 0; at < sky.values.size(); ++at) {
+    if (std::isfinite(sky.values[at]) && sky.values[at] >= 0) continue;
+    const std::size_t pixel = at / 3, width = static_cast<std::size_t>(sky.width);
+    return invalid_argument(name + ": luminance " + std::to_string(sky.values[at]) + " nit at column " +
+                            std::to_string(pixel % width) + ", row " + std::to_string(pixel / width) +
+                            " is not within [0, inf)");
   }
   return {};
 }
@@ -171,6 +213,7 @@ Result<void> check_scene_values(const Scene& scene) {
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) RADBAKE_RETURN_IF_ERROR(check_mesh(scene, i));
   for (std::size_t i = 0; i < scene.lights.size(); ++i) RADBAKE_RETURN_IF_ERROR(check_light(scene, i));
   if (!is_amount(scene.sky)) return invalid_argument("sky: luminance " + in_words(scene.sky) + " nit");
+  if (scene.environment) RADBAKE_RETURN_IF_ERROR(check_environment(scene));
   return {};
 }
 

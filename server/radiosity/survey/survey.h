@@ -10,7 +10,22 @@
 
 namespace radbake::radiosity {
 
-/// Facts of a scene, counted before a ray is traced. Field for field radbake.v1.Survey.
+/// Facts of the lights of one kind.
+struct LightFacts {
+  std::uint64_t num = 0;
+  std::uint64_t num_lit = 0;     ///< of those, with an intensity above zero
+  std::uint64_t num_facing = 0;  ///< of those, before some surface: the light can arrive
+  /// Of num_lit, lamps not inside the convex enclosure, or directions in which a ray from inside may meet a surface.
+  std::uint64_t num_outside = 0;
+};
+
+/// Facts of what varies a property over a surface, of the materials in use.
+struct VariationFacts {
+  std::uint64_t num = 0;       ///< textures; of reflectance also meshes with vertex colours
+  std::uint64_t num_flat = 0;  ///< of those, of one value in fact (vertex colours: on each triangle)
+};
+
+/// Facts of a scene, counted before a ray is traced. Up to brightest_emitters field for field radbake.v1.Survey.
 struct Survey {
   std::uint64_t num_meshes = 0;
   std::uint64_t num_vertices = 0;
@@ -44,6 +59,15 @@ struct Survey {
   std::uint64_t num_textures_flat = 0;          ///< of one value in fact
   double lamp_lumens = 0;                       ///< of point and spot lights
   std::vector<std::string> brightest_emitters;  ///< up to 3 meshes with most lumens
+  // What decides about effects beside.
+  LightFacts point = {}, spot = {}, directional = {}, sun = {};
+  double sun_diameter_radians = 0;  ///< of the widest
+  bool has_environment = false, is_environment_lit = false;
+  VariationFacts varying_reflectance = {}, varying_emission = {};
+  std::uint64_t num_emissive_materials = 0;  ///< in use, with an emissive factor above zero
+  std::uint64_t num_alpha_materials = 0;     ///< in use, masked or blended
+  std::uint64_t num_alpha_opaque = 0;        ///< of those, opaque in fact
+  bool is_exposed = false;  ///< every vertex lies on or behind every triangle's plane: no front sees any surface
 };
 
 /// A scene that passed every check, as one list of triangles, with its facts.
@@ -60,7 +84,7 @@ inline constexpr double kEmitterThreshold = 4;
 ///
 /// Errors: kInvalidArgument, naming mesh, triangle, vertex, material or light and the value: index out of range,
 /// non-finite position, normal or texture coordinate, reflectance outside [0, 1), negative or non-finite emission,
-/// texture of impossible size, no triangle with area, no light.
+/// texture of impossible size, an environment that is not twice as wide as high, no triangle with area, no light.
 Result<SurveyedScene> survey_scene(const Scene& scene);
 
 }  // namespace radbake::radiosity

@@ -16,6 +16,7 @@ TEST(BakeOptions, AreRefusedByNameAndValue) {
   EXPECT_EQ(message({.atlas_size = 8192}), "atlas size 8192 is not within 64..4096");
   EXPECT_EQ(message({.rays = 7}), "rays 7 is not within 8..65536");
   EXPECT_EQ(message({.max_patches = 63}), "max patches 63 is not within 64..16777216");
+  EXPECT_EQ(message({.ao_distance = -1}), "ambient occlusion distance -1 is not within 1e-06..1e+09");
   EXPECT_EQ(message({.threads = -1}), "threads -1 is not within 1..4096");
 }
 

@@ -81,6 +81,55 @@ INSTANTIATE_TEST_SUITE_P(
                   s.lights.push_back({"spot", SpotLight{{0, 1, 0}, {0, -1, 0}, {1, 1, 1}, 0.8, 0.4}});
                 },
                 "cone angles"},
+        Refusal{"TransmittanceAboveOne",
+                [](Scene& s) {
+                  s.materials[0].transmittance = {0, 1.5, 0};
+                },
+                "transmittance (0, 1.5, 0) is not within [0, 1]"},
+        Refusal{"TransmittanceNotFinite", [](Scene& s) { s.materials[0].transmittance.z = kNan; }, "(0, 0, nan)"},
+        Refusal{"PassesOnMoreThanItGets",
+                [](Scene& s) {
+                  s.materials[0].transmittance = {0.5, 0.51, 0.5};
+                },
+                "reflectance + transmittance reaches (1, 1.01, 1), above 1"},
+        Refusal{"TextureTimesBothTooBright",
+                [](Scene& s) {
+                  s.textures.push_back({"snow", 1, 1, 3, Wrap::kRepeat, Wrap::kRepeat, {1.5f, 1.5f, 1.5f}});
+                  s.materials[0].reflectance_texture = TextureReference{0, 1};
+                  s.materials[0].transmittance = {0.25, 0.25, 0.25};
+                },
+                "transmittance times texture reaches (1.125, 1.125, 1.125), above 1"},
+        Refusal{"SunDiameterNegative",
+                [](Scene& s) {
+                  s.lights.push_back({"sun", DirectionalLight{{0, -1, 0}, {1, 1, 1}, -0.1}});
+                },
+                "light 'sun': angular diameter -0.1"},
+        Refusal{"SunDiameterHalfTheSky",
+                [](Scene& s) {
+                  s.lights.push_back({"sun", DirectionalLight{{0, -1, 0}, {1, 1, 1}, 3.15}});
+                },
+                "is not within [0, pi)"},
+        Refusal{"EnvironmentNotTwiceAsWide",
+                [](Scene& s) {
+                  s.environment = TexturePlane{"noon", 2, 2, 3, Wrap::kRepeat, Wrap::kClamp, std::vector<float>(12)};
+                },
+                "environment 'noon': 2 x 2 pixels are not twice as wide as high"},
+        Refusal{"EnvironmentTooShort",
+                [](Scene& s) {
+                  s.environment = TexturePlane{"noon", 2, 1, 3, Wrap::kRepeat, Wrap::kClamp, std::vector<float>(5)};
+                },
+                "environment 'noon': 5 values for 2 x 1 x 3"},
+        Refusal{"EnvironmentNotANumber",
+                [](Scene& s) {
+                  s.environment = TexturePlane{"noon", 2, 1, 3, Wrap::kRepeat, Wrap::kClamp, {0, 0, 0, 0, NAN, 0}};
+                },
+                "luminance nan nit at column 1, row 0 is not within [0, inf)"},
+        Refusal{"EnvironmentBesideASky",
+                [](Scene& s) {
+                  s.sky = {1, 1, 1};
+                  s.environment = TexturePlane{"noon", 2, 1, 3, Wrap::kRepeat, Wrap::kClamp, std::vector<float>(6)};
+                },
+                "environment 'noon' and a constant sky of (1, 1, 1) nit exclude each other"},
         Refusal{"SkyNegative",
                 [](Scene& s) {
                   s.sky = {-1, 0, 0};

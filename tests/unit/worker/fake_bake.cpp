@@ -24,6 +24,13 @@ BakePlan fake_plan(const Scene& scene) {
   return plan;
 }
 
+/// Says what the library was told of costs.
+Prediction fake_prediction(const BakeOptions& options) {
+  Prediction prediction;
+  prediction.total.cpu_seconds = 1000 * options.costs.row_ray;
+  return prediction;
+}
+
 Tile fake_tile(int index) {
   Tile tile{0, 0, 64 * (index % 2), 0, 64, 64, 4, std::vector<float>(64 * 64 * 4, static_cast<float>(index))};
   tile.layer_name = "lightmap_0";
@@ -33,8 +40,8 @@ Tile fake_tile(int index) {
 
 }  // namespace
 
-Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions&, std::stop_token) {
-  return PlannedBake{fake_plan(scene), {}};
+Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token) {
+  return PlannedBake{fake_plan(scene), fake_prediction(options)};
 }
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
@@ -71,7 +78,10 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
   outcome.layers.push_back(std::move(layer));
   outcome.report.plan = fake_plan(scene);
   outcome.report.num_gather_rays = 1000;
-  outcome.report.stages = {{"preparing", 0.25}, {"gathering", 0.5}};
+  outcome.report.stages = {{"preparing", 0.25, 0.375}, {"gathering", 0.5, 0.75}};
+  outcome.report.prediction = fake_prediction(options);
+  outcome.report.costs = options.costs;
+  outcome.report.costs.texel_ray = 0.125;
   return outcome;
 }
 

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -46,7 +47,8 @@ std::vector<std::string> unset_fields(const Message& message) {
 
 radiosity::BakePlan full_plan() {
   radiosity::BakePlan plan;
-  plan.survey = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10.5, 11.5, 0.5, 13.5, true};
+  plan.survey = {1,    2,    3,    4,    5,    6,  7,    8,    9,    10.5, 11.5, 0.5,  13.5, true, 0.25, 16,
+                 true, true, true, 0.75, 0.01, 22, 23.5, 24.5, 25.5, 26.5, 27.5, 28.5, 29.5, 30,   31.5, {"lamp"}};
   plan.atlas_size = 14;
   plan.num_texels = 15;
   plan.num_patches = 16;
@@ -62,13 +64,28 @@ radiosity::BakePlan full_plan() {
   plan.atlas_height = 21;
   plan.num_lightmaps = 22;
   plan.num_vertex_groups = 23;
+  plan.effects = {{radiosity::Effect::kSun, radiosity::EffectState::kUnsupported, "why", 26.5, true}};
+  plan.num_channels = 1;
+  plan.form_factors_reason = "of the rows";
+  plan.transport_reason = "of the operator";
+  plan.solver_reason = "of the solver";
   plan.warnings = {{"plan_warning", "of the plan"}};
   return plan;
 }
 
 TEST(ResultMessages, SetEveryFieldOfAPlan) {
   const v1::Plan plan = to_message(full_plan());
-  EXPECT_THAT(unset_fields(plan), ::testing::IsEmpty());
+  EXPECT_THAT(unset_fields(plan), ::testing::ElementsAre("prediction"));
+  EXPECT_EQ(plan.survey().num_instances(), 16U);
+  EXPECT_EQ(plan.survey().escape_share(), 0.75);
+  EXPECT_EQ(plan.survey().area_volume_m2(), 29.5);
+  EXPECT_EQ(plan.survey().lamp_lumens(), 31.5);
+  EXPECT_EQ(plan.effects(0).effect(), "sun");
+  EXPECT_EQ(plan.effects(0).state(), "unsupported");
+  EXPECT_EQ(plan.effects(0).value(), 26.5);
+  EXPECT_EQ(plan.num_channels(), 1U);
+  EXPECT_EQ(plan.estimator_reason(), "of the rows");
+  EXPECT_EQ(plan.solver_reason(), "of the solver");
   EXPECT_EQ(plan.survey().num_glowing_triangles(), 9U);
   EXPECT_EQ(plan.survey().extent_m(), 13.5);
   EXPECT_EQ(plan.rays_per_texel(), 17U);
@@ -78,6 +95,29 @@ TEST(ResultMessages, SetEveryFieldOfAPlan) {
   EXPECT_EQ(plan.estimator(), "adaptive");
   EXPECT_EQ(plan.transport(), "streamed");
   EXPECT_EQ(plan.solver(), "shooting");
+}
+
+TEST(ResultMessages, SetEveryFieldOfAPredictionAndOfCosts) {
+  radiosity::Prediction prediction;
+  prediction.stages = {{"gathering", 1.5, 2.5, 3.5, 4.5, 5}};
+  prediction.total = {"total", 6.5, 7.5, 8.5, 9.5, 10};
+  prediction.costliest = {{"vase", 11.5, 12, 13}};
+  prediction.effects = {{radiosity::Effect::kOcclusion, 14.5}};
+  prediction.source = "pilot";
+  prediction.pilot_seconds = 15.5;
+  const v1::Prediction message = to_message(prediction);
+  EXPECT_THAT(unset_fields(message), ::testing::IsEmpty());
+  EXPECT_EQ(message.stages(0).cpu_seconds_high(), 3.5);
+  EXPECT_EQ(message.total().memory_bytes(), 10U);
+  EXPECT_EQ(message.costliest(0).num_patches(), 13U);
+  EXPECT_EQ(message.effects(0).effect(), "occlusion");
+
+  // There and back.
+  const v1::HostCosts costs = to_message(radiosity::HostCosts{1, 2, 3, 4, 5, 6, 7});
+  EXPECT_THAT(unset_fields(costs), ::testing::IsEmpty());
+  EXPECT_EQ(to_message(settings::to_costs(costs)).SerializeAsString(), costs.SerializeAsString());
+  EXPECT_EQ(costs.light_ray(), 3);
+  EXPECT_EQ(costs.entry(), 7);
 }
 
 TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
@@ -95,7 +135,7 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   report.vertices = {61, 62, 63};
   report.warnings = {{"bake_warning", "of the bake"}};
   const v1::BakeReport message = to_message(report);
-  EXPECT_THAT(unset_fields(message), ::testing::ElementsAre("engine_version", "run"));
+  EXPECT_THAT(unset_fields(message), ::testing::UnorderedElementsAre("plan.prediction", "engine_version", "run"));
   EXPECT_EQ(message.num_light_rays(), 24U);
   EXPECT_EQ(message.solver().sweeps(), 25U);
   EXPECT_EQ(message.solver().tolerance(), 29.5);
@@ -171,6 +211,17 @@ TEST(ResultMessages, ReadEverySetting) {
   settings.set_transport(v1::TRANSPORT_DENSE);
   settings.set_solver(v1::SOLVER_LU);
   settings.set_transport_memory_bytes(4096);
+  const auto choose = [&settings](const char* effect, v1::EffectChoice choice) {
+    v1::EffectOverride& change = *settings.add_effects();
+    change.set_effect(effect);
+    change.set_choice(choice);
+  };
+  choose("sun", v1::EFFECT_CHOICE_OFF);
+  choose("color", v1::EFFECT_CHOICE_ON);
+  choose("tint", v1::EFFECT_CHOICE_AUTO);
+  settings.add_layers(v1::EXTRA_LAYER_INDIRECT);
+  settings.add_layers(v1::EXTRA_LAYER_AO);
+  settings.set_ao_distance(2.5);
   v1::RunOptions run;
   run.set_threads(3);
   const radiosity::BakeOptions options = settings::to_options(settings, run);
@@ -186,6 +237,38 @@ TEST(ResultMessages, ReadEverySetting) {
   EXPECT_EQ(options.solver, radiosity::Solver::kLu);
   EXPECT_EQ(options.transport_memory, 4096u);
   EXPECT_EQ(options.threads, 3);
+  EXPECT_EQ(options.effects,
+            (radiosity::EffectOverrides{{radiosity::Effect::kSun, false}, {radiosity::Effect::kColor, true}}));
+  EXPECT_FALSE(options.wants_direct);
+  EXPECT_TRUE(options.wants_indirect);
+  EXPECT_TRUE(options.wants_ao);
+  EXPECT_EQ(options.ao_distance, 2.5);
+  EXPECT_FALSE(settings::find_effect_problem(settings).has_value());
+}
+
+TEST(Settings, NameTheEffectOrLayerThatIsWrong) {
+  const auto problem = [](const auto& spoil) {
+    v1::BakeSettings settings;
+    settings.add_effects()->set_effect("sun");
+    spoil(settings);
+    const auto found = settings::find_effect_problem(settings);
+    return found ? found->field + ": " + found->description : std::string();
+  };
+  using ::testing::StartsWith;
+  EXPECT_EQ(problem([](v1::BakeSettings&) {}), "");
+  EXPECT_THAT(problem([](auto& s) { s.add_effects()->set_effect("caustics"); }),
+              StartsWith("settings.effects: 'caustics' is not an effect; there are emitters point"));
+  EXPECT_EQ(problem([](auto& s) { s.add_effects()->set_effect("sun"); }),
+            "settings.effects: 'sun' is chosen more than once");
+  EXPECT_EQ(problem([](auto& s) { s.mutable_effects(0)->set_choice(static_cast<v1::EffectChoice>(9)); }),
+            "settings.effects: 'sun': 9 is not an EffectChoice");
+  EXPECT_EQ(problem([](auto& s) { s.add_layers(v1::EXTRA_LAYER_UNSPECIFIED); }),
+            "settings.layers: 0 is not an ExtraLayer");
+  EXPECT_EQ(problem([](auto& s) { s.add_layers(static_cast<v1::ExtraLayer>(4)); }),
+            "settings.layers: 4 is not an ExtraLayer");
+  EXPECT_EQ(problem([](auto& s) { s.set_ao_distance(-1); }),
+            "settings.ao_distance: -1.000000 is not between 0 and 1000000");
+  EXPECT_THAT(problem([](auto& s) { s.set_ao_distance(NAN); }), StartsWith("settings.ao_distance: "));
 }
 
 /// The words of the wire are those of the library: what is chosen by name on one side has that name on the other.

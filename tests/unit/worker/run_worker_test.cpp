@@ -117,11 +117,20 @@ TEST(RunWorker, SendsTilesAndThePlaneThatTheResultNames) {
 
 TEST(RunWorker, FillsInTheReportOfTheRun) {
   const BlobFiles files(small_scene());
-  const Reports reports = reports_of(files.order(kBakes));
+  v1::WorkerCommand order = files.order(kBakes);
+  order.mutable_start()->mutable_costs()->set_row_ray(0.25);
+  const Reports reports = reports_of(order);
   const v1::RunReport& run = reports.back().bake_finished().report().run();
   std::vector<std::string> stages;
   for (const v1::StageSeconds& stage : run.stages()) stages.push_back(stage.stage());
   EXPECT_THAT(stages, ElementsAre("decoding", "preparing", "gathering", "writing"));
+  std::vector<std::string> cpu_stages;
+  for (const v1::StageSeconds& stage : run.cpu_stages()) cpu_stages.push_back(stage.stage());
+  EXPECT_EQ(cpu_stages, stages);
+  EXPECT_EQ(run.cpu_stages(1).seconds(), 0.375);
+  EXPECT_GT(run.cpu_stages(3).seconds(), 0);
+  EXPECT_EQ(run.prediction().total().cpu_seconds(), 250);
+  EXPECT_EQ(run.costs().texel_ray(), 0.125);
   EXPECT_GT(run.wall_seconds(), 0);
   EXPECT_GT(run.cpu_seconds(), 0);
   EXPECT_GT(run.peak_memory_bytes(), 1'000'000U);
@@ -135,10 +144,13 @@ TEST(RunWorker, FillsInTheReportOfTheRun) {
 
 TEST(RunWorker, PlansWithoutBaking) {
   const BlobFiles files(small_scene());
-  const Reports reports = reports_of(files.order(kBakes, true));
+  v1::WorkerCommand order = files.order(kBakes, true);
+  order.mutable_start()->mutable_costs()->set_row_ray(0.25);
+  const Reports reports = reports_of(order);
   ASSERT_TRUE(reports.back().has_plan_finished());
   EXPECT_EQ(reports.back().plan_finished().atlas_size(), 128U);
   EXPECT_EQ(reports.back().plan_finished().survey().num_meshes(), 1U);
+  EXPECT_EQ(reports.back().plan_finished().prediction().total().cpu_seconds(), 250);
 }
 
 TEST(RunWorker, ReportsABadSceneByName) {

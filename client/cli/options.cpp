@@ -8,6 +8,7 @@
 
 #include "client/cli/exit_code.h"
 #include "client/cli/help_texts.h"
+#include "client/options/effect_options.h"
 #include "client/options/words.h"
 #include "common/base/version.h"
 
@@ -59,6 +60,9 @@ class Parser {
     }
     if (line_.command == Command::kSubmit && line_.files.vertex_colors && line_.bake.output == v1::OUTPUT_LIGHTMAP) {
       return EarlyExit{kUsage, "", "--vertex-colors needs light by vertex: --output vertices or --output both\n"};
+    }
+    if (const std::string problem = options::find_contradiction(line_.bake); !problem.empty()) {
+      return EarlyExit{kUsage, "", problem + "\n"};
     }
     // Both the name that submit prints and the bare id name a job.
     if (!line_.job.empty() && line_.job.rfind("bakes/", 0) != 0) line_.job = "bakes/" + line_.job;

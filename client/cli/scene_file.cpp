@@ -49,6 +49,11 @@ Result<gltf::GltfScene> read_scene(const std::filesystem::path& path, double max
   return scene;
 }
 
+Result<TexturePlane> read_sky_image(const std::filesystem::path& file, double scale) {
+  RADBAKE_ASSIGN_OR_RETURN(const image::ImageCodec* images, image::load_image_codec());
+  return images->read_environment(file, scale, image::kMaxEnvironmentWidth);
+}
+
 Result<BakedScene> keep_for_writing(const std::filesystem::path& path, gltf::GltfScene scene,
                                     const EncodedScene& encoded) {
   const Result<std::string> bytes = gltf::read_file(path, gltf::kMaxFileBytes);

@@ -25,6 +25,10 @@ struct BakedScene {
 /// Errors: read_gltf()'s, or the library's.
 Result<gltf::GltfScene> read_scene(const std::filesystem::path& path, double max_reflectance);
 
+/// Reads a sky of every direction, with the image library that is loaded for it.
+/// Errors: image::read_environment()'s, or the library's.
+Result<TexturePlane> read_sky_image(const std::filesystem::path& file, double scale);
+
 /// Reads a scene and holds it for after its bake.
 Result<BakedScene> keep_for_writing(const std::filesystem::path& path, gltf::GltfScene scene,
                                     const EncodedScene& encoded);

@@ -53,7 +53,7 @@ Result<Prepared> prepare(const CommandContext& context, Stopwatch& stages) {
   const std::stop_token stop = context.interrupt.once();
   context.reporter.stage("reading", -1);
   RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, read_scene(line.scene, line.bake.max_reflectance));
-  options::add_sky_and_sun(line.bake.sky, line.bake.sun, read.scene);
+  RADBAKE_RETURN_IF_ERROR(options::add_sky_and_sun(line.bake, read_sky_image, read.scene));
   for (const Warning& warning : read.warnings) context.reporter.warning(warning);
   RADBAKE_RETURN_IF_ERROR(options::require_light(read.scene, line.scene.filename().string()));
   SceneReport report;

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "client/image/decode_image.h"
+#include "client/image/read_environment.h"
 #include "client/image/write_image.h"
 #include "common/base/result.h"
 
@@ -13,6 +14,7 @@ namespace radbake::image {
 struct ImageCodec {
   const char* engine_version;  ///< C++ types cross the border: program and library must be of one version
   decltype(&image::decode_image) decode_image;
+  decltype(&image::read_environment) read_environment;
   decltype(&image::write_exr) write_exr;
   decltype(&image::write_preview_png) write_preview_png;
   decltype(&image::write_hdr) write_hdr;

@@ -4,8 +4,8 @@
 
 extern "C" __attribute__((visibility("default"))) const radbake::image::ImageCodec* radbake_image_codec() {
   using namespace radbake;
-  static const image::ImageCodec codec{
-      kEngineVersion,    &image::decode_image,   &image::write_exr,        &image::write_preview_png,
-      &image::write_hdr, &image::write_rgbm_png, &image::encode_linear_png};
+  static const image::ImageCodec codec{kEngineVersion,         &image::decode_image,      &image::read_environment,
+                                       &image::write_exr,      &image::write_preview_png, &image::write_hdr,
+                                       &image::write_rgbm_png, &image::encode_linear_png};
   return &codec;
 }

@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "client/options/effect_options.h"
 #include "client/options/values.h"
 #include "client/options/words.h"
 
@@ -13,6 +14,7 @@ namespace {
 
 constexpr std::uint32_t kMinAtlasSize = 64, kMaxAtlasSize = 4096;
 constexpr double kMinDensity = 1e-3, kMaxDensity = 1e5;
+constexpr double kDefaultAoDistance = 1;  // metres, the server's
 const std::map<std::string, v1::LightmapUv> kLightmapUvs = {
     {"auto", v1::LIGHTMAP_UV_AUTO}, {"keep", v1::LIGHTMAP_UV_KEEP}, {"unwrap", v1::LIGHTMAP_UV_UNWRAP}};
 const std::map<std::string, v1::Output> kOutputs = {
@@ -117,10 +119,18 @@ void add_bake_options(CLI::App& command, BakeChoices& choices) {
       ->type_name("R,G,B");
   command
       .add_option_function<std::string>(
+          "--hdri",
+          [&choices](const std::string& text) { choices.sky_image = value_or_throw("--hdri", parse_sky_image(text)); },
+          "Light from a sky image: equirectangular .hdr or .exr, +Y up, its values x SCALE in nit, linear Rec.709")
+      ->type_name("FILE[:SCALE]")
+      ->excludes("--sky");
+  command
+      .add_option_function<std::string>(
           "--sun", [&choices](const std::string& text) { choices.sun = value_or_throw("--sun", parse_sun(text)); },
-          "Light from a sun: the direction in which it travels (glTF's world, +Y is up) and its illuminance in lx on "
-          "a facing surface")
-      ->type_name("DX,DY,DZ:R,G,B");
+          "Light from a sun: the direction in which it travels (glTF's world, +Y is up), its illuminance in lx on a "
+          "facing surface, and its angular diameter: 0.53 where none is given, 0 for hard shadows")
+      ->type_name("DX,DY,DZ:R,G,B[:DEGREES]");
+  add_effect_options(command, choices);
   command
       .add_option_function<std::string>(
           "--form-factors",
@@ -190,6 +200,14 @@ v1::BakeSettings to_settings(const BakeChoices& choices) {
   settings.set_solver(choices.solver);
   settings.set_transport(choices.transport);
   settings.set_transport_memory_bytes(choices.memory);
+  for (const auto& [name, choice] : choices.effects) {
+    if (choice == v1::EFFECT_CHOICE_AUTO) continue;
+    v1::EffectOverride& effect = *settings.add_effects();
+    effect.set_effect(name);
+    effect.set_choice(choice);
+  }
+  for (const v1::ExtraLayer layer : choices.layers) settings.add_layers(layer);
+  if (choices.ao_distance != kDefaultAoDistance) settings.set_ao_distance(choices.ao_distance);
   return settings;
 }
 

@@ -2,8 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <set>
+#include <string>
 
+#include "client/options/values.h"
 #include "common/scene/scene.h"
 #include "radbake/v1/settings.pb.h"
 
@@ -25,13 +29,18 @@ struct BakeChoices {
   std::uint32_t threads = 0;
   double max_reflectance = 0.98;
   std::optional<Vec3> sky;
+  std::optional<SkyImage> sky_image;  ///< never beside a sky
   std::optional<DirectionalLight> sun;
+  std::map<std::string, v1::EffectChoice> effects;  ///< by name; others: v1::EFFECT_CHOICE_AUTO
+  std::set<v1::ExtraLayer> layers;
+  double ao_distance = 0;  ///< metres
 };
 
 /// Gives a command the options of a bake. `choices` outlives it. Bad values throw CLI11's exception when it parses.
 void add_bake_options(CLI::App& command, BakeChoices& choices);
 
-/// The choices as a server takes them. The sky, the sun and the limit on reflectance are in the scene by then.
+/// The choices as a server takes them, equal bytes for equal choices. The sky, the sun and the limit on reflectance are
+/// in the scene by then.
 v1::BakeSettings to_settings(const BakeChoices& choices);
 v1::RunOptions to_run_options(const BakeChoices& choices);
 

@@ -31,13 +31,21 @@ Vec3 strength(const Light& light) {
 
 }  // namespace
 
-void add_sky_and_sun(const std::optional<Vec3>& sky, const std::optional<DirectionalLight>& sun, Scene& scene) {
-  if (sky) scene.sky = *sky;
-  if (sun) scene.lights.push_back({"sun", *sun});
+Result<void> add_sky_and_sun(const BakeChoices& choices, const EnvironmentReader& read_environment, Scene& scene) {
+  if (choices.sky) scene.sky = *choices.sky;
+  if (choices.sun) scene.lights.push_back({"sun", *choices.sun});
+  if (choices.sky_image) {
+    RADBAKE_ASSIGN_OR_RETURN(scene.environment, read_environment(choices.sky_image->file, choices.sky_image->scale));
+  }
+  return {};
 }
 
 bool has_light(const Scene& scene) {
   if (max_component(scene.sky) > 0) return true;
+  if (scene.environment && std::any_of(scene.environment->values.begin(), scene.environment->values.end(),
+                                       [](float luminance) { return luminance > 0; })) {
+    return true;
+  }
   const auto shines = [](const Light& light) { return max_component(strength(light)) > 0; };
   if (std::any_of(scene.lights.begin(), scene.lights.end(), shines)) return true;
   return std::any_of(scene.meshes.begin(), scene.meshes.end(), [&](const Mesh& mesh) {
@@ -50,7 +58,8 @@ Result<void> require_light(const Scene& scene, const std::string& scene_name) {
   return invalid_argument(
       scene_name +
       ": no light at all: no material in use emits, and there is no lamp, no sky and no sun. Add one: a sky with --sky "
-      "1000,1000,1000, a sun with --sun 0.3,-1,0.2:50000,48000,45000, or in the scene an emissive factor or a lamp "
+      "1000,1000,1000 or --hdri dawn.hdr, a sun with --sun 0.3,-1,0.2:50000,48000,45000, or in the scene an emissive "
+      "factor or a lamp "
       "(KHR_lights_punctual)");
 }
 

@@ -2,9 +2,16 @@
 
 #include <charconv>
 #include <cmath>
+#include <numbers>
 
 namespace radbake::options {
 namespace {
+
+/// Whether all of a word is one number.
+bool parse_number(std::string_view word, double& value) {
+  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return failure == std::errc() && end == word.data() + word.size() && !word.empty();
+}
 
 /// Three finite numbers with commas between them; `what` says what was expected.
 Result<Vec3> parse_three(std::string_view text, const std::string& what) {
@@ -13,8 +20,7 @@ Result<Vec3> parse_three(std::string_view text, const std::string& what) {
     const std::size_t comma = text.find(',');
     const std::string_view word = text.substr(0, comma);
     if ((comma == std::string_view::npos) != (i == 2)) return invalid_argument("expected " + what);
-    const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), values[i]);
-    if (failure != std::errc() || end != word.data() + word.size() || word.empty()) {
+    if (!parse_number(word, values[i])) {
       return invalid_argument("'" + std::string(word) + "' is not a number; expected " + what);
     }
     if (!std::isfinite(values[i])) return invalid_argument("'" + std::string(word) + "' is not finite");
@@ -34,15 +40,41 @@ Result<Vec3> parse_rgb(const std::string& text) {
 Result<DirectionalLight> parse_sun(const std::string& text) {
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) {
-    return invalid_argument("expected DX,DY,DZ:R,G,B, for example 0.3,-1,0.2:50000,48000,45000");
+    return invalid_argument("expected DX,DY,DZ:R,G,B or DX,DY,DZ:R,G,B:DEGREES, for example " +
+                            std::string("0.3,-1,0.2:50000,48000,45000"));
   }
   RADBAKE_ASSIGN_OR_RETURN(const Vec3 direction,
                            parse_three(std::string_view(text).substr(0, colon), "a direction DX,DY,DZ"));
-  RADBAKE_ASSIGN_OR_RETURN(const Vec3 illuminance, parse_rgb(text.substr(colon + 1)));
+  const std::size_t second = text.find(':', colon + 1);
+  RADBAKE_ASSIGN_OR_RETURN(const Vec3 illuminance, parse_rgb(text.substr(colon + 1, second - colon - 1)));
+  double degrees = kSunDegrees;
+  if (second != std::string::npos) {
+    const std::string word = text.substr(second + 1);
+    if (!parse_number(word, degrees)) {
+      return invalid_argument("'" + word + "' is not a number; expected the sun's angular diameter in degrees");
+    }
+    if (!(degrees >= 0 && degrees < 180)) {
+      return invalid_argument("'" + word + "' degrees: the sun's angular diameter is at least 0 and below 180");
+    }
+  }
   // Scaled first, so that neither the largest nor the smallest numbers overflow when they are squared.
   const double scale = std::fmax(std::fabs(direction.x), std::fmax(std::fabs(direction.y), std::fabs(direction.z)));
   if (scale == 0) return invalid_argument("the direction " + text.substr(0, colon) + " is zero");
-  return DirectionalLight{normalized(direction / scale), illuminance};
+  return DirectionalLight{normalized(direction / scale), illuminance, degrees * std::numbers::pi / 180};
+}
+
+Result<SkyImage> parse_sky_image(const std::string& text) {
+  SkyImage image{text};
+  const std::size_t colon = text.rfind(':');
+  const std::string word = colon == std::string::npos ? "" : text.substr(colon + 1);
+  if (parse_number(word, image.scale)) {
+    image.file = text.substr(0, colon);
+    if (!(image.scale > 0 && std::isfinite(image.scale))) {
+      return invalid_argument("'" + word + "' as a scale to nit: must be above 0 and finite");
+    }
+  }
+  if (image.file.empty()) return invalid_argument("expected FILE or FILE:SCALE, for example dawn.hdr:2000");
+  return image;
 }
 
 Result<std::uint64_t> parse_bytes(const std::string& text) {

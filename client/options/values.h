@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "common/base/result.h"
@@ -13,9 +14,23 @@ namespace radbake::options {
 /// Errors: kInvalidArgument names the number.
 Result<Vec3> parse_rgb(const std::string& text);
 
-/// "DX,DY,DZ:R,G,B": the direction in which the sun's light travels (not zero; any length) and its illuminance in lx.
+/// Angular diameter of the sun as it is seen from here, degrees.
+inline constexpr double kSunDegrees = 0.53;
+
+/// "DX,DY,DZ:R,G,B[:DEGREES]": the direction in which the sun's light travels (not zero; any length), its illuminance
+/// in lx, and the angular diameter of its disc, at least 0 and below 180; kSunDegrees where there is none.
 /// Errors: kInvalidArgument names the number.
 Result<DirectionalLight> parse_sun(const std::string& text);
+
+/// A sky from an image.
+struct SkyImage {
+  std::filesystem::path file;
+  double scale = 1;  ///< of the image's values to nit
+};
+
+/// "FILE[:SCALE]": what follows the last colon is the scale if it is a number.
+/// Errors: kInvalidArgument for no file, or a scale that is not positive and finite.
+Result<SkyImage> parse_sky_image(const std::string& text);
 
 /// "N", "NK", "NM" or "NG": bytes, 1024 a step; at least 1K.
 /// Errors: kInvalidArgument names the value.

@@ -6,6 +6,7 @@
 
 #include "client/gltf/read_gltf.h"
 #include "client/image/decode_image.h"
+#include "client/image/read_environment.h"
 #include "client/options/scene_light.h"
 
 namespace radbake::study {
@@ -17,7 +18,10 @@ Result<StudyScene> read_study_scene(const std::filesystem::path& path, const opt
     return image::decode_image(bytes, name, is_srgb);
   };
   RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, gltf::read_gltf(path, decode, reading));
-  options::add_sky_and_sun(choices.sky, choices.sun, read.scene);
+  const auto read_environment = [](const std::filesystem::path& file, double scale) {
+    return image::read_environment(file, scale);
+  };
+  RADBAKE_RETURN_IF_ERROR(options::add_sky_and_sun(choices, read_environment, read.scene));
   RADBAKE_RETURN_IF_ERROR(options::require_light(read.scene, path.filename().string()));
   return StudyScene{std::move(read.scene), std::move(read.warnings)};
 }

@@ -135,7 +135,14 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "bench_cancel: %s\n", read.error().message.c_str());
     return 1;
   }
-  radbake::options::add_sky_and_sun(choices.sky, choices.sun, read->scene);
+  const auto no_sky_images = [](const std::filesystem::path& file, double) -> radbake::Result<radbake::TexturePlane> {
+    return radbake::invalid_argument(file.string() + ": this benchmark bakes scenes without images");
+  };
+  const auto lit = radbake::options::add_sky_and_sun(choices, no_sky_images, read->scene);
+  if (!lit.ok()) {
+    std::fprintf(stderr, "bench_cancel: %s\n", lit.error().message.c_str());
+    return 1;
+  }
   const auto options =
       radbake::settings::to_options(radbake::options::to_settings(choices), radbake::options::to_run_options(choices));
   radbake::measure_library(read->scene, options, runs, seconds);

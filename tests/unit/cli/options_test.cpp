@@ -176,7 +176,13 @@ INSTANTIATE_TEST_SUITE_P(
         BadOption{{"--max-reflectance", "1"}, "'1' is not a number from 0 to below 1"},
         BadOption{{"--max-reflectance", "-0.1"}, "'-0.1'"}, BadOption{{"--max-reflectance", "nan"}, "'nan'"},
         BadOption{{"--threads", "0"}, "'0'"}, BadOption{{"--seed", "-1"}, "-1"}, BadOption{{"--seed", "x"}, "x"},
-        BadOption{{"--frobnicate"}, "--frobnicate"}));
+        BadOption{{"--sun", "0,-1,0:1,1,1:180"}, "'180' degrees"},
+        BadOption{{"--hdri", "dawn.hdr:0"}, "'0' as a scale"},
+        BadOption{{"--hdri", "dawn.hdr", "--sky", "1,1,1"}, "--sky"},
+        BadOption{{"--effect", "caustics=on"}, "'caustics' is none of emitters, point"},
+        BadOption{{"--layers", "glow"}, "'glow' is none of ao, direct, indirect"},
+        BadOption{{"--layers", "ao", "--output", "vertices"}, "--output vertices makes none"},
+        BadOption{{"--ao-distance", "2"}, "needs --layers ao"}, BadOption{{"--frobnicate"}, "--frobnicate"}));
 
 TEST_F(Options, NamesWhatIsMissing) {
   EXPECT_EQ(refused({}).code, kUsage);

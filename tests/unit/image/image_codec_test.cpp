@@ -63,6 +63,9 @@ TEST_F(ImageCodecTest, WritesAndReadsThroughTheLibrary) {
   ASSERT_TRUE(plane.ok()) << plane.error().message;
   EXPECT_EQ(plane->width, 4);
   EXPECT_EQ(plane->height, 2);
+  const auto sky = (*codec)->read_environment(folder_ / "map.exr", 2, kMaxEnvironmentWidth);
+  ASSERT_TRUE(sky.ok()) << sky.error().message;
+  EXPECT_EQ(sky->values, std::vector<float>(24, 2.0f));
   // Errors cross the border too.
   const auto refused = (*codec)->write_exr(folder_ / "none" / "map.exr", 4, 2, 3, grey);
   ASSERT_FALSE(refused.ok());

@@ -56,4 +56,7 @@ Result<std::vector<EffectPlan>> plan_effects(const Survey& survey, const AskedOu
 /// Those that are on.
 EffectSet effects_on(const std::vector<EffectPlan>& plan);
 
+/// Whether a set has any kind of light.
+bool has_light(const EffectSet& effects);
+
 }  // namespace radbake::radiosity

@@ -31,6 +31,9 @@ Result<void> check_options(const BakeOptions& options) {
   RADBAKE_RETURN_IF_ERROR(check_range("threads", options.threads, 1, 4096));
   RADBAKE_RETURN_IF_ERROR(
       check_range("transport memory", options.transport_memory, std::uint64_t{1} << 10, std::uint64_t{1} << 50));
+  if (options.output == Output::kVertices && (options.wants_direct || options.wants_indirect || options.wants_ao)) {
+    return invalid_argument("layers are lightmaps, and with light by vertex alone there are none");
+  }
   return {};
 }
 
@@ -38,6 +41,63 @@ int max_patches_of(const BakeOptions& options) {
   if (options.max_patches > 0) return options.max_patches;
   return options.form_factors == FormFactors::kAnalytic ? kDefaultMaxPatchesByFormula : kDefaultMaxPatches;
 }
+
+namespace {
+
+std::string in_megabytes(std::uint64_t bytes) {
+  std::ostringstream text;
+  text.precision(3);
+  text << static_cast<double>(bytes) * 1e-6 << " MB";
+  return text.str();
+}
+
+/// Says why each method is what it is.
+void give_reasons(const BakeOptions& options, std::uint64_t row_entries, BakePlan& plan) {
+  const std::string asked = "as asked: ";
+  const std::string rays =
+      std::to_string(plan.rays_per_row) + " rays for each row of " + std::to_string(plan.num_patches) + " patches";
+  switch (plan.form_factors) {
+    case FormFactors::kAuto:
+    case FormFactors::kHemisphere: plan.form_factors_reason = rays; break;
+    case FormFactors::kAdaptive:
+      plan.form_factors_reason = "near and large pairs by formula, the rest by " + rays;
+      break;
+    case FormFactors::kHemicube:
+      plan.form_factors_reason = "cubes of " + std::to_string(kHemicubeResolution) + " cells a side for the rows of " +
+                                 std::to_string(plan.num_patches) + " patches";
+      break;
+    case FormFactors::kAnalytic:
+      plan.form_factors_reason = "by formula between " + std::to_string(plan.num_patches) + " patches";
+      break;
+  }
+  if (options.form_factors != FormFactors::kAuto) plan.form_factors_reason = asked + plan.form_factors_reason;
+
+  const std::string bytes = in_megabytes(plan.transport_bytes), limit = in_megabytes(plan.transport_bytes_limit);
+  switch (plan.transport) {
+    case Transport::kAuto:
+    case Transport::kSparse:
+      plan.transport_reason = "at most " + std::to_string(std::min(row_entries, plan.num_patches)) + " of " +
+                              std::to_string(plan.num_patches) + " form factors a row: " + bytes;
+      break;
+    case Transport::kDense: plan.transport_reason = "rows are nearly full: " + bytes; break;
+    case Transport::kStreamed:
+      plan.transport_reason = options.transport == Transport::kStreamed
+                                  ? "rows are made anew in each step: " + bytes
+                                  : "stored rows would not fit " + limit + ": they are made anew in each step";
+      break;
+  }
+  if (options.transport != Transport::kAuto) plan.transport_reason = asked + plan.transport_reason;
+
+  std::ostringstream reflects;
+  reflects.precision(3);
+  reflects << "surfaces reflect up to " << 100 * plan.survey.max_reflectance << " %";
+  plan.solver_reason = options.solver                           ? asked + reflects.str()
+                       : plan.transport == Transport::kStreamed ? "fewest steps where each makes all rows anew"
+                       : plan.solver == Solver::kKrylov         ? reflects.str() + ": sweeps would be many"
+                                                                : reflects.str() + ": few sweeps";
+}
+
+}  // namespace
 
 void choose_methods(const BakeOptions& options, BakePlan& plan) {
   plan.form_factors = options.form_factors == FormFactors::kAuto ? FormFactors::kHemisphere : options.form_factors;
@@ -56,6 +116,7 @@ void choose_methods(const BakeOptions& options, BakePlan& plan) {
   const Solver solver =
       plan.transport == Transport::kStreamed ? Solver::kKrylov : default_solver(plan.survey.max_reflectance);
   plan.solver = options.solver.value_or(solver);
+  give_reasons(options, row_entries, plan);
 }
 
 int max_sweeps_of(double max_reflectance, double tolerance) {

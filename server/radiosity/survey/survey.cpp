@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/radiosity/survey/facts.h"
 #include "server/radiosity/survey/scene_checks.h"
 
 namespace radbake::radiosity {
@@ -89,12 +90,9 @@ Result<SurveyedScene> survey_scene(const Scene& scene) {
   survey.num_materials = scene.materials.size();
   survey.num_textures = scene.textures.size();
   survey.num_lights = scene.lights.size();
+  survey.num_instances = scene.num_instances;
   survey.has_sky = max_component(scene.sky) > 0;
-  for (const Mesh& mesh : scene.meshes) {
-    survey.num_vertices += mesh.positions.size();
-    survey.max_reflectance =
-        std::max(survey.max_reflectance, max_component(scene.materials[mesh.material].reflectance));
-  }
+  for (const Mesh& mesh : scene.meshes) survey.num_vertices += mesh.positions.size();
   list_triangles(scene, out);
   survey.num_triangles = out.surfaces.size();
   if (survey.num_triangles == 0) return invalid_argument("the scene has no triangle with an area");
@@ -104,6 +102,12 @@ Result<SurveyedScene> survey_scene(const Scene& scene) {
   }
   out.surfaces.simulate(EffectSet::all());
   count_emitters(out);
+  const ScenePlanes planes = find_scene_planes(out.surfaces);
+  survey.is_convex = planes.is_convex;
+  survey.is_exposed = planes.is_exposed;
+  survey.is_closed = planes.is_convex && is_watertight(out.surfaces);
+  find_material_facts(out.surfaces, survey);
+  find_light_facts(out.surfaces, planes, survey);
   if (survey.emitted_lumens <= 0 && scene.lights.empty() && !survey.has_sky && !scene.environment) {
     return invalid_argument(
         "the scene has no light: give a material an emissiveFactor, add a lamp (KHR_lights_punctual), or pass --sky, "

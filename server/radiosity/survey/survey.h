@@ -17,6 +17,7 @@ struct LightFacts {
   std::uint64_t num_facing = 0;  ///< of those, before some surface: the light can arrive
   /// Of num_lit, lamps not inside the convex enclosure, or directions in which a ray from inside may meet a surface.
   std::uint64_t num_outside = 0;
+  std::uint64_t num_beyond = 0;  ///< of num_lit, those that can only shine in from outside; parallel light always
 };
 
 /// Facts of what varies a property over a surface, of the materials in use.
@@ -65,6 +66,7 @@ struct Survey {
   bool has_environment = false, is_environment_lit = false;
   VariationFacts varying_reflectance = {}, varying_emission = {};
   std::uint64_t num_emissive_materials = 0;  ///< in use, with an emissive factor above zero
+  std::uint64_t num_emissive_dark = 0;       ///< of those, under a texture that is black in fact
   std::uint64_t num_alpha_materials = 0;     ///< in use, masked or blended
   std::uint64_t num_alpha_opaque = 0;        ///< of those, opaque in fact
   bool is_exposed = false;  ///< every vertex lies on or behind every triangle's plane: no front sees any surface

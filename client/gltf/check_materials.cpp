@@ -55,15 +55,26 @@ Result<void> check_material(const Entry& material, std::size_t num_textures) {
   if (pbr) {
     RADBAKE_RETURN_IF_ERROR(pbr->numbers("baseColorFactor", 4, 0, kMaxStrength));
     RADBAKE_RETURN_IF_ERROR(pbr->number("metallicFactor", 0, 1));
+    RADBAKE_RETURN_IF_ERROR(pbr->number("roughnessFactor", 0, 1));
     RADBAKE_RETURN_IF_ERROR(check_texture(*pbr, "baseColorTexture", num_textures));
     RADBAKE_RETURN_IF_ERROR(check_texture(*pbr, "metallicRoughnessTexture", num_textures));
     RADBAKE_RETURN_IF_ERROR(check_texture_transform(*pbr, "baseColorTexture"));
+    RADBAKE_RETURN_IF_ERROR(check_texture_transform(*pbr, "metallicRoughnessTexture"));
   }
   RADBAKE_RETURN_IF_ERROR(check_texture_transform(material, "emissiveTexture"));
   RADBAKE_ASSIGN_OR_RETURN(const auto strength, material.extension("KHR_materials_emissive_strength"));
   if (strength) RADBAKE_RETURN_IF_ERROR(strength->number("emissiveStrength", 0, kMaxStrength));
   RADBAKE_ASSIGN_OR_RETURN(const auto transmission, material.extension("KHR_materials_transmission"));
-  if (transmission) RADBAKE_RETURN_IF_ERROR(transmission->number("transmissionFactor", 0, 1));
+  if (transmission) {
+    RADBAKE_RETURN_IF_ERROR(transmission->number("transmissionFactor", 0, 1));
+    RADBAKE_RETURN_IF_ERROR(check_texture(*transmission, "transmissionTexture", num_textures));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const auto volume, material.extension("KHR_materials_volume"));
+  if (volume) RADBAKE_RETURN_IF_ERROR(volume->number("thicknessFactor", 0, kMaxStrength));
+  RADBAKE_ASSIGN_OR_RETURN(const auto clear_coat, material.extension("KHR_materials_clearcoat"));
+  if (clear_coat) RADBAKE_RETURN_IF_ERROR(clear_coat->number("clearcoatFactor", 0, 1));
+  RADBAKE_ASSIGN_OR_RETURN(const auto refraction, material.extension("KHR_materials_ior"));
+  if (refraction) RADBAKE_RETURN_IF_ERROR(refraction->number("ior", 0, kMaxStrength));
   return {};
 }
 

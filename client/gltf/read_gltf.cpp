@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <exception>
+#include <map>
 #include <new>
+#include <set>
 
 #include "client/gltf/check_document.h"
 #include "client/gltf/container.h"
@@ -54,6 +56,17 @@ bool replace_unusable_normals(Mesh& mesh) {
   return is_replaced;
 }
 
+// Placements of meshes that are placed more than once.
+std::uint64_t count_instances(const std::vector<MeshSource>& sources) {
+  std::map<int, std::set<int>> nodes_of_mesh;
+  for (const MeshSource& source : sources) nodes_of_mesh[source.mesh].insert(source.node);
+  std::uint64_t count = 0;
+  for (const auto& [mesh, nodes] : nodes_of_mesh) {
+    if (nodes.size() > 1) count += nodes.size();
+  }
+  return count;
+}
+
 // A primitive of the file, ready to be placed.
 struct LocalMesh {
   WeldedMesh welded;
@@ -88,6 +101,7 @@ class SceneReader {
     result_.scene.materials = std::move(materials_.materials());
     result_.scene.textures = std::move(materials_.textures());
     result_.num_triangles_dropped = counts_.num_triangles_dropped;
+    result_.scene.num_instances = count_instances(result_.sources);
     // The last ones may have lost all their triangles.
     counts_.area_m2.resize(result_.scene.materials.size(), 0.0);
     counts_.limited_area_m2.resize(result_.scene.materials.size(), 0.0);

@@ -52,7 +52,7 @@ struct GltfScene {
 /// Errors: kInvalidArgument with a message that names the file and the mesh, accessor, node or value: not a glTF,
 /// truncated, missing buffer, index out of range, counts beyond the buffer, NaN or infinite position, a cycle in the
 /// node tree, no area, unknown required extension, corrupt Draco, image that does not decode.
-/// Source: glTF 2.0 specification; KHR_materials_emissive_strength, KHR_lights_punctual.
+/// Source: glTF 2.0 specification; KHR_materials_emissive_strength, KHR_lights_punctual, KHR_materials_transmission.
 Result<GltfScene> read_gltf(const std::filesystem::path& path, const ImageDecoder& decode_image,
                             const ReadOptions& options);
 

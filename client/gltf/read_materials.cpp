@@ -11,6 +11,10 @@ namespace {
 
 // A texture of 8 bits cannot say less than this.
 constexpr double kSmallestMetallic = 1.0 / 255;
+// Smoother surfaces than this show the lights in themselves.
+constexpr double kGlossyRoughness = 0.5;
+// Of glass, and of what says nothing else: KHR_materials_ior.
+constexpr double kDefaultIor = 1.5;
 
 const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name) {
   const auto it = extensions.find(name);
@@ -54,6 +58,28 @@ TextureReference reference(const tinygltf::TextureInfo& info) {
   return result;
 }
 
+bool is_unlit(const tinygltf::Material& material) {
+  return extension(material.extensions, "KHR_materials_unlit") != nullptr;
+}
+
+// The share of light that a sheet lets through; unlit surfaces have nothing but their base colour.
+double transmission_of(const tinygltf::Material& material) {
+  if (is_unlit(material)) return 0;
+  return number(extension(material.extensions, "KHR_materials_transmission"), "transmissionFactor", 0);
+}
+
+// What a diffuse bake does not simulate.
+void read_flags(const tinygltf::Material& source, Material& material, const MaterialFacts& facts) {
+  material.has_normal_map = facts.has_normal_map;
+  if (facts.is_unlit) return;
+  const double clear_coat = number(extension(source.extensions, "KHR_materials_clearcoat"), "clearcoatFactor", 0);
+  material.is_specular =
+      facts.is_metallic || clear_coat > 0 || source.pbrMetallicRoughness.roughnessFactor < kGlossyRoughness;
+  material.has_volume = number(extension(source.extensions, "KHR_materials_volume"), "thicknessFactor", 0) > 0;
+  const double ior = number(extension(source.extensions, "KHR_materials_ior"), "ior", kDefaultIor);
+  material.is_refractive = transmission_of(source) > 0 && (material.has_volume || ior != kDefaultIor);
+}
+
 bool is_emissive(const tinygltf::Material& material) {
   if (number(extension(material.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1) <= 0)
     return false;
@@ -94,8 +120,17 @@ Result<const TexturePlane*> MaterialReader::decoded(int index, bool is_srgb) {
 }
 
 Result<int> MaterialReader::scene_texture(const PlaneUse& use) {
-  const std::array<double, 8> key = {double(use.texture), use.ratio.x, use.ratio.y, use.ratio.z,
-                                     use.bound.x,         use.bound.y, use.bound.z, double(use.keeps_opacity)};
+  const std::array<double, 11> key = {double(use.texture),
+                                      use.ratio.x,
+                                      use.ratio.y,
+                                      use.ratio.z,
+                                      use.bound.x,
+                                      use.bound.y,
+                                      use.bound.z,
+                                      double(use.keeps_opacity),
+                                      double(use.metal_texture),
+                                      use.metal.metallic,
+                                      use.metal.roughness};
   if (const auto it = scene_textures_.find(key); it != scene_textures_.end()) return it->second;
   RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* source, decoded(use.texture, true));
   TexturePlane plane = *source;
@@ -103,8 +138,9 @@ Result<int> MaterialReader::scene_texture(const PlaneUse& use) {
   plane.values.clear();
   plane.values.reserve(std::size_t(plane.width) * std::size_t(plane.height) * std::size_t(plane.channels));
   for (std::size_t at = 0; at < source->values.size(); at += std::size_t(source->channels)) {
+    const double share = share_at(use, *source, at / std::size_t(source->channels));
     for (int c = 0; c < 3; ++c) {
-      float value = static_cast<float>(source->values[at + c] * use.ratio[c]);
+      float value = static_cast<float>(source->values[at + c] * share * use.ratio[c]);
       // Rounding to float must not lift a value over its bound.
       if (use.bound[c] > 0 && value > use.bound[c]) value = std::nextafter(static_cast<float>(use.bound[c]), 0.0f);
       plane.values.push_back(value);
@@ -117,41 +153,79 @@ Result<int> MaterialReader::scene_texture(const PlaneUse& use) {
   return index;
 }
 
+double MaterialReader::share_at(const PlaneUse& use, const TexturePlane& base, std::size_t texel) const {
+  if (use.metal_texture < 0) return 1;
+  const std::size_t width = std::size_t(base.width);
+  const Vec2 centre{(double(texel % width) + 0.5) / base.width, (double(texel / width) + 0.5) / base.height};
+  return diffuse_share_at(use.metal, images_.at({use.metal_texture, false}), centre);
+}
+
+Result<MaterialReader::MetalUse> MaterialReader::read_metal(const tinygltf::Material& source) {
+  const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
+  MetalUse use;
+  use.factors = {pbr.metallicFactor, pbr.roughnessFactor};
+  if (is_unlit(source)) use.factors.metallic = 0;
+  use.mean = metal_shares(use.factors);
+  const int texture = pbr.metallicRoughnessTexture.index;
+  if (use.factors.metallic <= 0 || texture < 0) return use;
+  RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* metal, decoded(texture, false));
+  use.mean = mean_metal_shares(use.factors, *metal);
+  if (transmission_of(source) > 0 || pbr.baseColorTexture.index < 0) return use;
+  // Both looked up alike: texel by texel.
+  const tinygltf::TextureInfo &info = pbr.metallicRoughnessTexture, &base = pbr.baseColorTexture;
+  if (texcoord_set(info) != texcoord_set(base) || reference(info).transform != reference(base).transform) return use;
+  RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* color, decoded(base.index, true));
+  if (metal->wrap_s == color->wrap_s && metal->wrap_t == color->wrap_t) use.texture = texture;
+  return use;
+}
+
 Result<void> MaterialReader::read_reflectance(const tinygltf::Material& source, Material& material,
                                               MaterialFacts& facts) {
   const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
-  const Vec3 factor{pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]};
   const double limit = options_.max_reflectance;
   material.alpha = pbr.baseColorFactor[3];
   material.alpha_mode = alpha_mode_of(source.alphaMode);
   material.alpha_cutoff = source.alphaCutoff;
-  double lowest_alpha = material.alpha;
+  RADBAKE_ASSIGN_OR_RETURN(const MetalUse metal, read_metal(source));
+  facts.is_metallic = 1 - metal.mean.dielectric >= kSmallestMetallic;
+
+  // Divide the base colour: what goes through, and what is reflected. A sheet's shares are of one.
+  const double through = transmission_of(source) * metal.mean.dielectric;
+  Vec3 base{pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]};
+  if (through > 0) base = {std::fmin(base.x, 1), std::fmin(base.y, 1), std::fmin(base.z, 1)};
+  const Vec3 factor = base * (metal.texture < 0 ? metal.mean.diffuse - through : 1.0);
+  material.transmittance = base * through;
   material.reflectance = {std::fmin(factor.x, limit), std::fmin(factor.y, limit), std::fmin(factor.z, limit)};
   if (pbr.baseColorTexture.index < 0) {
     facts.limited_share = max_component(factor) > limit ? 1 : 0;
     facts.untextured = factor;
-  } else {
-    material.reflectance_texture = reference(pbr.baseColorTexture);
-    RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* plane, decoded(pbr.baseColorTexture.index, true));
-    // Count the texels that are too bright, and find the most transparent one.
-    std::size_t num_limited = 0;
-    for (std::size_t at = 0; at < plane->values.size(); at += std::size_t(plane->channels)) {
-      const float* texel = &plane->values[at];
-      if (max_component(scaled_by(factor, {texel[0], texel[1], texel[2]})) > limit) ++num_limited;
-      if (plane->channels == 4) lowest_alpha = std::fmin(lowest_alpha, material.alpha * texel[3]);
-    }
-    facts.limited_share = double(num_limited) / (double(plane->width) * plane->height);
-    PlaneUse use;
-    use.texture = pbr.baseColorTexture.index;
-    use.keeps_opacity = material.alpha_mode != AlphaMode::kOpaque;
-    for (int c = 0; c < 3; ++c) {
-      if (material.reflectance[c] > 0) use.ratio[c] = factor[c] / material.reflectance[c];
-      if (material.reflectance[c] > 0 && num_limited > 0) use.bound[c] = limit / material.reflectance[c];
-    }
-    RADBAKE_ASSIGN_OR_RETURN(material.reflectance_texture->texture, scene_texture(use));
+    return {};
   }
-  const double opaque_from = material.alpha_mode == AlphaMode::kMask ? material.alpha_cutoff : 1;
-  facts.is_translucent = material.alpha_mode != AlphaMode::kOpaque && lowest_alpha < opaque_from;
+  material.reflectance_texture = reference(pbr.baseColorTexture);
+  RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* plane, decoded(pbr.baseColorTexture.index, true));
+  PlaneUse use;
+  use.texture = pbr.baseColorTexture.index;
+  use.keeps_opacity = material.alpha_mode != AlphaMode::kOpaque;
+  use.metal_texture = metal.texture;
+  if (metal.texture >= 0) use.metal = metal.factors;
+
+  // Count the texels that are too bright.
+  const std::size_t num_texels = std::size_t(plane->width) * std::size_t(plane->height);
+  std::size_t num_limited = 0;
+  for (std::size_t i = 0; i < num_texels; ++i) {
+    const float* texel = &plane->values[i * std::size_t(plane->channels)];
+    const Vec3 color = Vec3{texel[0], texel[1], texel[2]} * share_at(use, *plane, i);
+    if (max_component(scaled_by(factor, color)) > limit) ++num_limited;
+  }
+  facts.limited_share = double(num_limited) / double(num_texels);
+  for (int c = 0; c < 3; ++c) {
+    if (material.reflectance[c] <= 0) continue;
+    use.ratio[c] = factor[c] / material.reflectance[c];
+    if (num_limited > 0) use.bound[c] = limit / material.reflectance[c];
+    // The texture multiplies both: what its ratio adds for the reflectance is taken off here.
+    material.transmittance[c] /= use.ratio[c];
+  }
+  RADBAKE_ASSIGN_OR_RETURN(material.reflectance_texture->texture, scene_texture(use));
   return {};
 }
 
@@ -165,29 +239,15 @@ Result<void> MaterialReader::read_emission(const tinygltf::Material& source, Mat
   return {};
 }
 
-bool MaterialReader::is_metallic(const tinygltf::Material& source) {
-  const double factor = source.pbrMetallicRoughness.metallicFactor;
-  const int texture = source.pbrMetallicRoughness.metallicRoughnessTexture.index;
-  if (factor <= 0 || texture < 0) return factor > 0;
-  // Metalness is in the blue channel. A texture that does not decode may say anything: it only costs a warning.
-  const Result<const TexturePlane*> plane = decoded(texture, false);
-  if (!plane.ok()) return true;
-  float highest = 0;
-  for (std::size_t at = 0; at < (*plane)->values.size(); at += std::size_t((*plane)->channels)) {
-    highest = std::max(highest, (*plane)->values[at + 2]);
-  }
-  return factor * highest >= kSmallestMetallic;
-}
-
 Result<void> MaterialReader::read(const tinygltf::Material& source, Material& material, MaterialFacts& facts) {
   RADBAKE_RETURN_IF_ERROR(read_reflectance(source, material, facts));
   RADBAKE_RETURN_IF_ERROR(read_emission(source, material));
   material.is_double_sided = source.doubleSided;
-  facts.is_metallic = is_metallic(source);
-  facts.is_transmissive =
-      number(extension(source.extensions, "KHR_materials_transmission"), "transmissionFactor", 0) > 0;
+  facts.is_unlit = is_unlit(source);
   facts.has_normal_map = source.normalTexture.index >= 0;
-  facts.is_unlit = extension(source.extensions, "KHR_materials_unlit") != nullptr;
+  const tinygltf::Value* transmission = extension(source.extensions, "KHR_materials_transmission");
+  facts.has_transmission_texture = transmission_of(source) > 0 && transmission->Has("transmissionTexture");
+  read_flags(source, material, facts);
   return {};
 }
 

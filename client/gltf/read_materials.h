@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/gltf/load_model.h"
+#include "client/gltf/metal.h"
 #include "client/gltf/read_gltf.h"
 #include "common/base/result.h"
 #include "common/scene/scene.h"
@@ -16,10 +17,9 @@ namespace radbake::gltf {
 /// What a file says of a material and a diffuse bake does not follow, or not fully.
 struct MaterialFacts {
   double limited_share = 0;  ///< of its surface, by texels: reflectance above the limit
-  Vec3 untextured;           ///< base colour factor before it was limited; zero where a texture multiplies it
+  Vec3 untextured;           ///< reflectance before it was limited; zero where a texture multiplies it
   bool is_metallic = false;
-  bool is_translucent = false;  ///< masked or blended, and not opaque in fact
-  bool is_transmissive = false;
+  bool has_transmission_texture = false;
   bool has_normal_map = false;
   bool is_unlit = false;
 };
@@ -33,8 +33,15 @@ class MaterialReader {
 
   /// Index into materials() of a material of the file, -1 being glTF's default material.
   ///
-  /// Reflectance is base colour factor times texture, each channel at most the limit: with factor f' = min(f, limit)
-  /// and texture t' = min(f t, limit) / f', the product is exact where it needs no limit.
+  /// Reflectance is base colour factor times texture times what metalness and transmission leave of it, each channel
+  /// at most the limit: with factor f' = min(f, limit) and texture t' = min(f t, limit) / f', the product is exact
+  /// where it needs no limit. The shares are those of metal_shares(), and of the dielectric part transmission takes its
+  /// own:
+  ///
+  ///   reflectance = base (diffuse - T dielectric),   transmittance = base T dielectric,   T: transmission factor
+  ///
+  /// A texture of metalness and roughness is followed texel by texel, at the centres of the base colour's texels, where
+  /// both are looked up alike and nothing is transmitted; elsewhere by the mean of its shares.
   /// Errors: kInvalidArgument, naming the material and the texture or image.
   Result<int> scene_material(int material);
 
@@ -53,12 +60,21 @@ class MaterialReader {
     Vec3 ratio{1, 1, 1};
     Vec3 bound = {};  // 0: none
     bool keeps_opacity = false;
+    int metal_texture = -1;  // whose shares multiply each texel
+    MetalRoughness metal = {};
+  };
+  // What metalness leaves of the base colour.
+  struct MetalUse {
+    MetalShares mean;
+    int texture = -1;  // that is followed texel by texel
+    MetalRoughness factors;
   };
 
   Result<void> read(const tinygltf::Material& source, Material& material, MaterialFacts& facts);
   Result<void> read_reflectance(const tinygltf::Material& source, Material& material, MaterialFacts& facts);
   Result<void> read_emission(const tinygltf::Material& source, Material& material);
-  bool is_metallic(const tinygltf::Material& source);
+  Result<MetalUse> read_metal(const tinygltf::Material& source);
+  double share_at(const PlaneUse& use, const TexturePlane& base, std::size_t texel) const;
   Result<const TexturePlane*> decoded(int texture, bool is_srgb);
   Result<int> scene_texture(const PlaneUse& use);
 
@@ -68,9 +84,9 @@ class MaterialReader {
   std::vector<Material> materials_;
   std::vector<MaterialFacts> facts_;
   std::vector<TexturePlane> textures_;
-  std::map<int, int> scene_materials_;                   // of the file -> of the scene
-  std::map<std::pair<int, bool>, TexturePlane> images_;  // by texture and whether it is sRGB
-  std::map<std::array<double, 8>, int> scene_textures_;  // by PlaneUse
+  std::map<int, int> scene_materials_;                    // of the file -> of the scene
+  std::map<std::pair<int, bool>, TexturePlane> images_;   // by texture and whether it is sRGB
+  std::map<std::array<double, 11>, int> scene_textures_;  // by PlaneUse
 };
 
 }  // namespace radbake::gltf

@@ -52,12 +52,10 @@ std::vector<Warning> scene_warnings(std::span<const Material> materials, std::sp
   };
   warn_areas("reflectance_limited", "reflectance limited to " + compact(options.max_reflectance),
              [&](std::size_t i) { return counts.limited_area_m2[i]; });
-  warn("metallic_as_diffuse", "metal is baked as a diffuse surface of its base colour",
+  warn("metallic_as_diffuse", "metal is baked as a diffuse surface of base colour x roughness^2 / 2",
        [](const MaterialFacts& f) { return f.is_metallic; });
-  warn("alpha_not_simulated", "masked and blended surfaces are baked as opaque",
-       [](const MaterialFacts& f) { return f.is_translucent; });
-  warn("transmission_not_simulated", "transmission is not simulated: baked as opaque",
-       [](const MaterialFacts& f) { return f.is_transmissive; });
+  warn("transmission_texture_ignored", "textures of transmission are not followed: the factor holds everywhere",
+       [](const MaterialFacts& f) { return f.has_transmission_texture; });
   warn("normal_map_not_simulated", "normal maps do not change the baked light",
        [](const MaterialFacts& f) { return f.has_normal_map; });
   warn("unlit", "unlit materials are baked as diffuse surfaces of their base colour",

@@ -79,8 +79,8 @@ TEST(GltfLights, NamesWhatIsWrongWithALight) {
                  {"light 0", "outerConeAngle is 2"});
   expect_refused(
       read_bytes(
-          lit({{"type", "spot"}, {"spot", {{"innerConeAngle", 0.5}, {"outerConeAngle", 0.5}}}}, json::object()).glb()),
-      {"node 1", "innerConeAngle"});
+          lit({{"type", "spot"}, {"spot", {{"innerConeAngle", 0.75}, {"outerConeAngle", 0.5}}}}, json::object()).glb()),
+      {"node 1", "innerConeAngle 0.75", "is not below outerConeAngle 0.5"});
   expect_refused(read_bytes(lit({{"type", "directional"}}, {{"name", "sun"}, {"scale", {1, 1, 0}}}).glb()),
                  {"node 1 'sun'", "direction"});
   GltfBuilder file = lit({{"type", "point"}}, json::object());

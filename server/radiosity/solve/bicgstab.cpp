@@ -11,15 +11,16 @@ constexpr int kMaxSteps = 200;
 constexpr double kMaxGrowth = 1e3;
 
 /// a / b by channels; 0 where b is 0 or nothing is left to solve, so that a channel that is solved stays.
-Vec3 quotient(Vec3 a, Vec3 b) {
-  const auto divide = [](double x, double y) { return y != 0 && std::isfinite(x / y) ? x / y : 0; };
-  return {divide(a.x, b.x), divide(a.y, b.y), divide(a.z, b.z)};
+template <Channels C>
+C quotient(C a, C b) {
+  return by_channel(a, b, [](double x, double y) { return y != 0 && std::isfinite(x / y) ? x / y : 0; });
 }
 
 /// Stabilised bi-conjugate gradients on (I - rho F) B' = source, channels side by side.
+template <Channels C>
 class BiconjugateGradients {
  public:
-  BiconjugateGradients(SolveMonitor& monitor, std::span<const Vec3> residual)
+  BiconjugateGradients(SolveMonitor<C>& monitor, std::span<const C> residual)
       : monitor_(monitor),
         residual_(residual.begin(), residual.end()),
         shadow_(residual_),
@@ -29,69 +30,70 @@ class BiconjugateGradients {
         reach_(inner(shadow_, residual_)) {}
 
   /// One step. Returns max|r| as it is carried along; infinity where it was cancelled.
-  double step(std::vector<Vec3>& radiosity) {
+  double step(std::vector<C>& radiosity) {
     const std::size_t n = radiosity.size();
     constexpr double kNone = std::numeric_limits<double>::infinity();
     monitor_.add_steps(1, 0);
     // v = A p, alpha = <r^, r> / <r^, v>, s = r - alpha v
     if (!apply(direction_, applied_)) return kNone;
-    const Vec3 alpha = quotient(reach_, inner(shadow_, applied_));
+    const C alpha = quotient(reach_, inner(shadow_, applied_));
     for (std::size_t i = 0; i < n; ++i) {
       radiosity[i] += scaled_by(alpha, direction_[i]);
       residual_[i] -= scaled_by(alpha, applied_[i]);
     }
     // t = A s, omega = <t, s> / <t, t>, r = s - omega t
     if (!apply(residual_, stabiliser_)) return kNone;
-    const Vec3 omega = quotient(inner(stabiliser_, residual_), inner(stabiliser_, stabiliser_));
+    const C omega = quotient(inner(stabiliser_, residual_), inner(stabiliser_, stabiliser_));
     for (std::size_t i = 0; i < n; ++i) {
       radiosity[i] += scaled_by(omega, residual_[i]);
       residual_[i] -= scaled_by(omega, stabiliser_[i]);
     }
     // p = r + beta (p - omega v), beta = <r^, r> / <r^, r> before * alpha / omega
-    const Vec3 reach = inner(shadow_, residual_);
-    const Vec3 beta = scaled_by(quotient(reach, reach_), quotient(alpha, omega));
+    const C reach = inner(shadow_, residual_);
+    const C beta = scaled_by(quotient(reach, reach_), quotient(alpha, omega));
     for (std::size_t i = 0; i < n; ++i) {
       direction_[i] = residual_[i] + scaled_by(beta, direction_[i] - scaled_by(omega, applied_[i]));
     }
     reach_ = reach;
-    return largest_component(residual_);
+    return monitor_.largest_of(residual_);
   }
 
  private:
   /// (I - rho F) values
-  bool apply(const std::vector<Vec3>& values, std::vector<Vec3>& applied) {
+  bool apply(const std::vector<C>& values, std::vector<C>& applied) {
     if (!monitor_.gather(values, applied)) return false;
     for (std::size_t i = 0; i < values.size(); ++i) {
       applied[i] = values[i] - scaled_by(monitor_.problem().reflectance[i], applied[i]);
     }
     return true;
   }
-  Vec3 inner(const std::vector<Vec3>& u, const std::vector<Vec3>& v) const {
-    Vec3 sum;
+  C inner(const std::vector<C>& u, const std::vector<C>& v) const {
+    C sum{};
     for (std::size_t i = 0; i < u.size(); ++i) sum += scaled_by(u[i], v[i]) * monitor_.transport().areas()[i];
     return sum;
   }
 
-  SolveMonitor& monitor_;
-  std::vector<Vec3> residual_, shadow_, direction_, applied_, stabiliser_;
-  Vec3 reach_;
+  SolveMonitor<C>& monitor_;
+  std::vector<C> residual_, shadow_, direction_, applied_, stabiliser_;
+  C reach_{};
 };
 
 }  // namespace
 
-void solve_by_bicgstab(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+template <Channels C>
+void solve_by_bicgstab(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   if (!monitor.goes_on(radiosity)) return;
   for (;;) {
     const double bound_before = monitor.relative_error_bound();
-    const double first_residual = largest_component(monitor.residuals());
-    BiconjugateGradients gradients(monitor, monitor.residuals());
-    const std::vector<Vec3> before = radiosity;
+    const double first_residual = monitor.largest_of(monitor.residuals());
+    BiconjugateGradients<C> gradients(monitor, monitor.residuals());
+    const std::vector<C> before = radiosity;
     bool has_grown = false;
     for (int k = 0; k < kMaxSteps; ++k) {
       const double residual = gradients.step(radiosity);
       if (residual == 0) break;
       has_grown = !(residual <= kMaxGrowth * first_residual);
-      if (has_grown || !monitor.needs_no_look(residual, flux_of(monitor.transport().areas(), radiosity), radiosity)) {
+      if (has_grown || !monitor.needs_no_look(residual, monitor.flux_of(radiosity), radiosity)) {
         break;
       }
     }
@@ -101,5 +103,7 @@ void solve_by_bicgstab(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
     if (monitor.relative_error_bound() > bound_before / 2) return solve_by_gauss_seidel(monitor, radiosity);
   }
 }
+template void solve_by_bicgstab(SolveMonitor<double>&, std::vector<double>&);
+template void solve_by_bicgstab(SolveMonitor<Vec3>&, std::vector<Vec3>&);
 
 }  // namespace radbake::radiosity

@@ -2,9 +2,10 @@
 
 namespace radbake::radiosity {
 
-void solve_by_gauss_seidel(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+template <Channels C>
+void solve_by_gauss_seidel(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   const TransportOperator& transport = monitor.transport();
-  const RadiosityProblem& problem = monitor.problem();
+  const ProblemOf<C>& problem = monitor.problem();
   while (monitor.goes_on(radiosity)) {
     // B'_i <- source_i + rho_i sum_j F_ij B'_j, each with the newest values.
     for (std::uint32_t i = 0; i < radiosity.size(); ++i) {
@@ -14,5 +15,7 @@ void solve_by_gauss_seidel(SolveMonitor& monitor, std::vector<Vec3>& radiosity) 
     monitor.add_steps(1, static_cast<std::int64_t>(radiosity.size()));
   }
 }
+template void solve_by_gauss_seidel(SolveMonitor<double>&, std::vector<double>&);
+template void solve_by_gauss_seidel(SolveMonitor<Vec3>&, std::vector<Vec3>&);
 
 }  // namespace radbake::radiosity

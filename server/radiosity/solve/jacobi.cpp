@@ -2,8 +2,9 @@
 
 namespace radbake::radiosity {
 
-void solve_by_jacobi(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
-  const RadiosityProblem& problem = monitor.problem();
+template <Channels C>
+void solve_by_jacobi(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
+  const ProblemOf<C>& problem = monitor.problem();
   while (monitor.goes_on(radiosity)) {
     // B'_i <- source_i + rho_i sum_j F_ij B'_j, all with the old values, which the look has gathered already.
     for (std::size_t i = 0; i < radiosity.size(); ++i) {
@@ -12,5 +13,7 @@ void solve_by_jacobi(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
     monitor.add_steps(1, 0);
   }
 }
+template void solve_by_jacobi(SolveMonitor<double>&, std::vector<double>&);
+template void solve_by_jacobi(SolveMonitor<Vec3>&, std::vector<Vec3>&);
 
 }  // namespace radbake::radiosity

@@ -17,9 +17,10 @@ constexpr double kMaxGrowth = 1e3;
 /// The matrix is self-adjoint and positive definite in the inner product <u, v> = sum_i A_i rho_i u_i v_i, because
 /// A_i F_ij = A_j F_ji. In terms of H no patch is divided by its reflectance: one with rho_i = 0 has no weight, and its
 /// H_i is gathered along.
+template <Channels C>
 class ConjugateGradients {
  public:
-  explicit ConjugateGradients(SolveMonitor& monitor)
+  explicit ConjugateGradients(SolveMonitor<C>& monitor)
       : monitor_(monitor),
         transport_(monitor.transport()),
         problem_(monitor.problem()),
@@ -27,7 +28,7 @@ class ConjugateGradients {
         gathered_(monitor.size()) {}
 
   /// Starts from H = irradiance, whose residual is gathered - irradiance, where gathered = F (source + rho H).
-  void start(std::span<const Vec3> irradiance, std::span<const Vec3> gathered) {
+  void start(std::span<const C> irradiance, std::span<const C> gathered) {
     irradiance_.assign(irradiance.begin(), irradiance.end());
     residual_.resize(irradiance.size());
     for (std::size_t i = 0; i < irradiance.size(); ++i) residual_[i] = gathered[i] - irradiance[i];
@@ -36,7 +37,7 @@ class ConjugateGradients {
   }
 
   /// One step, with the radiosity that belongs to it. Returns max|r| = max|rho h|; infinity where it was cancelled.
-  double step(std::vector<Vec3>& radiosity) {
+  double step(std::vector<C>& radiosity) {
     const std::size_t n = radiosity.size();
     // q = (I - F rho) p
     for (std::size_t i = 0; i < n; ++i) reflected_[i] = scaled_by(problem_.reflectance[i], direction_[i]);
@@ -45,7 +46,7 @@ class ConjugateGradients {
     for (std::size_t i = 0; i < n; ++i) gathered_[i] = direction_[i] - gathered_[i];
     // H += alpha p, h -= alpha q with alpha = <h, h> / <p, q>; a channel that is solved, or where the operator shows
     // itself indefinite, stays.
-    const Vec3 alpha = quotient(square_, inner(direction_, gathered_));
+    const C alpha = quotient(square_, inner(direction_, gathered_));
     for (std::size_t i = 0; i < n; ++i) {
       irradiance_[i] += scaled_by(alpha, direction_[i]);
       residual_[i] -= scaled_by(alpha, gathered_[i]);
@@ -53,36 +54,37 @@ class ConjugateGradients {
       reflected_[i] = scaled_by(problem_.reflectance[i], residual_[i]);
     }
     // p = h + beta p with beta = <h, h> / <h, h> before.
-    const Vec3 square = inner(residual_, residual_), beta = quotient(square, square_);
+    const C square = inner(residual_, residual_), beta = quotient(square, square_);
     for (std::size_t i = 0; i < n; ++i) direction_[i] = residual_[i] + scaled_by(beta, direction_[i]);
     square_ = square;
-    return largest_component(reflected_);
+    return monitor_.largest_of(reflected_);
   }
 
  private:
-  Vec3 inner(const std::vector<Vec3>& u, const std::vector<Vec3>& v) const {
-    Vec3 sum;
+  C inner(const std::vector<C>& u, const std::vector<C>& v) const {
+    C sum{};
     for (std::size_t i = 0; i < u.size(); ++i) {
       sum += scaled_by(problem_.reflectance[i], scaled_by(u[i], v[i])) * transport_.areas()[i];
     }
     return sum;
   }
-  static Vec3 quotient(Vec3 a, Vec3 b) {
-    return {b.x > 0 ? a.x / b.x : 0, b.y > 0 ? a.y / b.y : 0, b.z > 0 ? a.z / b.z : 0};
+  static C quotient(C a, C b) {
+    return by_channel(a, b, [](double x, double y) { return y > 0 ? x / y : 0; });
   }
 
-  SolveMonitor& monitor_;
+  SolveMonitor<C>& monitor_;
   const TransportOperator& transport_;
-  const RadiosityProblem& problem_;
-  std::vector<Vec3> irradiance_, residual_, direction_;
-  std::vector<Vec3> reflected_, gathered_;
-  Vec3 square_;
+  const ProblemOf<C>& problem_;
+  std::vector<C> irradiance_, residual_, direction_;
+  std::vector<C> reflected_, gathered_;
+  C square_{};
 };
 
 /// Cycles of conjugate directions; where one has not halved the bound, what needs no reciprocity.
-void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
-  ConjugateGradients gradients(monitor);
-  std::vector<Vec3> irradiance;
+template <Channels C>
+void run_cycles(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
+  ConjugateGradients<C> gradients(monitor);
+  std::vector<C> irradiance;
   if (!monitor.goes_on(radiosity)) return;
   for (;;) {
     const double bound_before = monitor.relative_error_bound();
@@ -95,11 +97,11 @@ void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
     if (!monitor.goes_on(radiosity)) return;
     gradients.start(irradiance, monitor.irradiance());
 
-    const double first_residual = largest_component(monitor.residuals());
+    const double first_residual = monitor.largest_of(monitor.residuals());
     for (int k = 0; k < kMaxDirections; ++k) {
       const double residual = gradients.step(radiosity);
       if (residual == 0 || residual > kMaxGrowth * first_residual) break;
-      if (!monitor.needs_no_look(residual, flux_of(monitor.transport().areas(), radiosity), radiosity)) break;
+      if (!monitor.needs_no_look(residual, monitor.flux_of(radiosity), radiosity)) break;
     }
     if (!monitor.goes_on(radiosity)) return;
     if (monitor.relative_error_bound() > bound_before / 2) return solve_by_bicgstab(monitor, radiosity);
@@ -108,7 +110,8 @@ void run_cycles(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
 
 }  // namespace
 
-void solve_by_krylov(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+template <Channels C>
+void solve_by_krylov(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   if (monitor.transport().is_reciprocal()) {
     run_cycles(monitor, radiosity);
   } else {
@@ -116,5 +119,7 @@ void solve_by_krylov(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
   }
   monitor.sharpen_bound();
 }
+template void solve_by_krylov(SolveMonitor<double>&, std::vector<double>&);
+template void solve_by_krylov(SolveMonitor<Vec3>&, std::vector<Vec3>&);
 
 }  // namespace radbake::radiosity

@@ -22,16 +22,18 @@ std::vector<double> weights_of(std::span<const double> areas) {
   return weights;
 }
 
-double unshot_flux(double weight, Vec3 unshot) {
-  const double flux = weight * (std::fabs(unshot.x) + std::fabs(unshot.y) + std::fabs(unshot.z)) / 3;
+template <Channels C>
+double unshot_flux(double weight, C unshot) {
+  const double flux = weight * mean_of_channels(magnitudes(unshot));
   return std::isfinite(flux) ? flux : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
 
-void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std::vector<Vec3>& unshot) {
+template <Channels C>
+void solve_by_shooting(SolveMonitor<C>& monitor, std::vector<C>& radiosity, std::vector<C>& unshot) {
   const TransportOperator& transport = monitor.transport();
-  const RadiosityProblem& problem = monitor.problem();
+  const ProblemOf<C>& problem = monitor.problem();
   const std::size_t n = radiosity.size(), steps_per_check = std::max<std::size_t>(1, n / 32);
   const std::vector<double> weights = weights_of(transport.areas());
   std::optional<LargestKey> largest;
@@ -51,7 +53,7 @@ void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std:
       keys.resize(n);
       for (std::size_t i = 0; i < n; ++i) {
         radiosity[i] += unshot[i];
-        flux += transport.areas()[i] * mean_component(unshot[i]);
+        flux += transport.areas()[i] * mean_of_channels(unshot[i]);
         keys[i] = unshot_flux(weights[i], unshot[i]);
       }
       largest->set(patches, keys);
@@ -66,7 +68,7 @@ void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std:
         break;
       }
       // Shoot from i: B_j += rho_j F_ji dB_i and dB_j += the same, for all j.
-      const Vec3 shot = unshot[i];
+      const C shot = unshot[i];
       constexpr double kNone = 0;
       unshot[i] = {};
       largest->set(std::span(&i, 1), std::span(&kNone, 1));
@@ -74,10 +76,10 @@ void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std:
       keys.resize(patches.size());
       for (std::size_t k = 0; k < patches.size(); ++k) {
         const std::uint32_t j = patches[k];
-        const Vec3 received = scaled_by(problem.reflectance[j], shot * form_factors[k]);
+        const C received = scaled_by(problem.reflectance[j], shot * form_factors[k]);
         radiosity[j] += received;
         unshot[j] += received;
-        flux += transport.areas()[j] * mean_component(received);
+        flux += transport.areas()[j] * mean_of_channels(received);
         keys[k] = unshot_flux(weights[j], unshot[j]);
       }
       largest->set(patches, keys);
@@ -91,5 +93,7 @@ void solve_by_shooting(SolveMonitor& monitor, std::vector<Vec3>& radiosity, std:
     }
   }
 }
+template void solve_by_shooting(SolveMonitor<double>&, std::vector<double>&, std::vector<double>&);
+template void solve_by_shooting(SolveMonitor<Vec3>&, std::vector<Vec3>&, std::vector<Vec3>&);
 
 }  // namespace radbake::radiosity

@@ -32,17 +32,23 @@ const char* solve_status_name(SolveStatus status) {
   return "unknown";
 }
 
-Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
-                          const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
-                          std::stop_token stop) {
+namespace {
+
+Vec3 in_all_channels(Vec3 v) { return v; }
+Vec3 in_all_channels(double v) { return {v, v, v}; }
+
+template <Channels C>
+Result<SolveReport> solve_channels(Solver solver, const TransportOperator& transport, const ProblemOf<C>& problem,
+                                   const SolveOptions& options, std::vector<C>& radiosity,
+                                   const SolveObserverOf<C>& observe, std::stop_token stop) {
   if (solver == Solver::kLu && transport.size() > options.max_lu_patches) {
     return invalid_argument("solver 'lu' is for at most " + std::to_string(options.max_lu_patches) +
                             " patches unless asked for by name; this scene has " + std::to_string(transport.size()));
   }
   RADBAKE_CHECK_EQ(radiosity.size(), transport.size());
   RADBAKE_CHECK(transport.is_reciprocal() || transport.is_by_columns() == reads_columns(solver));
-  SolveMonitor monitor(solver, transport, problem, options, observe, std::move(stop));
-  std::vector<Vec3> unshot;
+  SolveMonitor<C> monitor(solver, transport, problem, options, observe, std::move(stop));
+  std::vector<C> unshot;
   switch (solver) {
     case Solver::kLu: solve_by_lu(monitor, radiosity); break;
     case Solver::kJacobi: solve_by_jacobi(monitor, radiosity); break;
@@ -52,7 +58,39 @@ Result<SolveReport> solve(Solver solver, const TransportOperator& transport, con
     case Solver::kKrylov: solve_by_krylov(monitor, radiosity); break;
   }
   SolveReport report = monitor.take_report();
-  report.unshot = std::move(unshot);
+  for (const C& v : unshot) report.unshot.push_back(in_all_channels(v));
+  return report;
+}
+
+std::vector<double> means_of(const std::vector<Vec3>& values) {
+  std::vector<double> means;
+  means.reserve(values.size());
+  for (const Vec3& v : values) means.push_back(mean_of_channels(v));
+  return means;
+}
+
+}  // namespace
+
+Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+                          const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
+                          std::stop_token stop) {
+  return solve_channels(solver, transport, problem, options, radiosity, observe, std::move(stop));
+}
+
+Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const GreyProblem& problem,
+                          const SolveOptions& options, std::vector<double>& radiosity, const GreySolveObserver& observe,
+                          std::stop_token stop) {
+  return solve_channels(solver, transport, problem, options, radiosity, observe, std::move(stop));
+}
+
+Result<SolveReport> solve_grey(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+                               const SolveOptions& options, std::vector<Vec3>& radiosity,
+                               const GreySolveObserver& observe, std::stop_token stop) {
+  const GreyProblem grey{means_of(problem.source), means_of(problem.reflectance)};
+  std::vector<double> values = means_of(radiosity);
+  RADBAKE_ASSIGN_OR_RETURN(SolveReport report,
+                           solve(solver, transport, grey, options, values, observe, std::move(stop)));
+  for (std::size_t i = 0; i < values.size(); ++i) radiosity[i] = in_all_channels(values[i]);
   return report;
 }
 

@@ -15,10 +15,13 @@
 namespace radbake::radiosity {
 
 /// B' = source + rho (F B'): source = E_in + rho H^direct. Shapes: both [n]; channels are solved side by side.
-struct RadiosityProblem {
-  std::vector<Vec3> source;       ///< each channel >= 0
-  std::vector<Vec3> reflectance;  ///< each channel in [0, 1)
+template <Channels C>
+struct ProblemOf {
+  std::vector<C> source;       ///< each channel >= 0
+  std::vector<C> reflectance;  ///< each channel in [0, 1)
 };
+using RadiosityProblem = ProblemOf<Vec3>;
+using GreyProblem = ProblemOf<double>;
 
 /// What a step is: the factorisation or a refinement of `lu`, a sweep over all patches of `jacobi` and `gauss-seidel`,
 /// one patch of `southwell` and `shooting`, one direction of `krylov`.
@@ -90,17 +93,23 @@ struct SolveReport {
   double error_bound = std::numeric_limits<double>::infinity();
   double relative_error_bound = std::numeric_limits<double>::infinity();
   std::vector<SolveStep> history;  ///< the first guess, then each step; of southwell and shooting about 2 % apart
-  std::vector<Vec3> unshot;        ///< shooting only: what each patch has not yet sent, for ambient_display()
+  std::vector<Vec3> unshot;        ///< shooting only: what each patch has not yet sent, for ambient_display(); of one
+                                   ///< channel: in all three
 };
 
 /// What an observer sees. The spans last for the call. Unshot is empty but for shooting.
-struct SolveView {
+template <Channels C>
+struct SolveViewOf {
   const SolveStep& step;
-  std::span<const Vec3> radiosity;
-  std::span<const Vec3> unshot;
+  std::span<const C> radiosity;
+  std::span<const C> unshot;
 };
+using SolveView = SolveViewOf<Vec3>;
 /// Called for each entry of the history, on the thread that solves.
-using SolveObserver = std::function<void(const SolveView&)>;
+template <Channels C>
+using SolveObserverOf = std::function<void(const SolveViewOf<C>&)>;
+using SolveObserver = SolveObserverOf<Vec3>;
+using GreySolveObserver = SolveObserverOf<double>;
 
 /// Solves by the method asked for.
 ///
@@ -122,6 +131,17 @@ using SolveObserver = std::function<void(const SolveView&)>;
 Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
                           const SolveOptions& options, std::vector<Vec3>& radiosity, const SolveObserver& observe,
                           std::stop_token stop);
+
+/// The same in one channel: of three equal ones each has the same bits, and so has the report, in less time.
+Result<SolveReport> solve(Solver solver, const TransportOperator& transport, const GreyProblem& problem,
+                          const SolveOptions& options, std::vector<double>& radiosity, const GreySolveObserver& observe,
+                          std::stop_token stop);
+
+/// Solves the means of the channels as one, and gives the solution to all three: the bits of solve() where the three
+/// are equal. Shapes and errors as there.
+Result<SolveReport> solve_grey(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
+                               const SolveOptions& options, std::vector<Vec3>& radiosity,
+                               const GreySolveObserver& observe, std::stop_token stop);
 
 /// Radiosity to show while shooting is under way: unshot light is spread as if all patches saw each other evenly.
 ///

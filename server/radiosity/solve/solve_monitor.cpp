@@ -15,20 +15,23 @@ constexpr double kGrowthThatMeansDivergence = 1e6;
 
 }  // namespace
 
-double largest_component(std::span<const Vec3> values) {
+template <Channels C>
+double SolveMonitor<C>::largest_of(std::span<const C> values) {
   double largest = 0;
-  for (const Vec3& v : values) largest = std::max(largest, largest_component(v));
+  for (const C& v : values) largest = std::max(largest, largest_component(v));
   return largest;
 }
 
-double flux_of(std::span<const double> areas, std::span<const Vec3> radiosity) {
+template <Channels C>
+double SolveMonitor<C>::flux_of(std::span<const C> radiosity) const {
   double flux = 0;
-  for (std::size_t i = 0; i < areas.size(); ++i) flux += areas[i] * mean_component(radiosity[i]);
+  for (std::size_t i = 0; i < radiosity.size(); ++i) flux += transport_.areas()[i] * mean_of_channels(radiosity[i]);
   return flux;
 }
 
-SolveMonitor::SolveMonitor(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
-                           const SolveOptions& options, const SolveObserver& observe, std::stop_token stop)
+template <Channels C>
+SolveMonitor<C>::SolveMonitor(Solver solver, const TransportOperator& transport, const ProblemOf<C>& problem,
+                              const SolveOptions& options, const SolveObserverOf<C>& observe, std::stop_token stop)
     : transport_(transport),
       problem_(problem),
       options_(options),
@@ -47,7 +50,8 @@ SolveMonitor::SolveMonitor(Solver solver, const TransportOperator& transport, co
   margin_ = 1 - (transport.is_by_columns() ? largest_share_sent_on() : largest_share_passed_on());
 }
 
-double SolveMonitor::largest_share_passed_on() const {
+template <Channels C>
+double SolveMonitor<C>::largest_share_passed_on() const {
   double passed_on = 0;
   for (std::uint32_t i = 0; i < size(); ++i) {
     passed_on = std::max(passed_on, max_component(problem_.reflectance[i]) * transport_.row_sum(i));
@@ -55,7 +59,8 @@ double SolveMonitor::largest_share_passed_on() const {
   return passed_on;
 }
 
-double SolveMonitor::largest_share_sent_on() {
+template <Channels C>
+double SolveMonitor<C>::largest_share_sent_on() {
   const auto areas = transport_.areas();
   std::vector<double> sent_on(size(), 0);
   for_each_range(size(), transport_.rows_per_task(), [&](std::size_t begin, std::size_t end) {
@@ -73,23 +78,27 @@ double SolveMonitor::largest_share_sent_on() {
   return sent_on.empty() ? 0 : *std::max_element(sent_on.begin(), sent_on.end());
 }
 
-double SolveMonitor::size_of(std::span<const Vec3> values) const {
-  if (!transport_.is_by_columns()) return largest_component(values);
+template <Channels C>
+double SolveMonitor<C>::size_of(std::span<const C> values) const {
+  if (!transport_.is_by_columns()) return largest_of(values);
   double sum = 0;
   for (std::size_t i = 0; i < values.size(); ++i) sum += transport_.areas()[i] * largest_component(values[i]);
   return area_ > 0 ? sum / area_ : 0;
 }
 
-double SolveMonitor::seconds() const {
+template <Channels C>
+double SolveMonitor<C>::seconds() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
 }
 
-void SolveMonitor::add_steps(std::int64_t steps, std::int64_t work) {
+template <Channels C>
+void SolveMonitor<C>::add_steps(std::int64_t steps, std::int64_t work) {
   report_.steps += steps;
   report_.work += work;
 }
 
-bool SolveMonitor::look(std::span<const Vec3> radiosity) {
+template <Channels C>
+bool SolveMonitor<C>::look(std::span<const C> radiosity) {
   RADBAKE_CHECK_EQ(radiosity.size(), size());
   const bool is_by_columns = transport_.is_by_columns();
   if (is_by_columns) transport_.gather(radiosity, irradiance_);
@@ -99,9 +108,9 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
       const auto patch = static_cast<std::uint32_t>(i);
       // r = source + rho F B' - B', and a bound on its own rounding: (n + 4) u times the sum of magnitudes.
       if (!is_by_columns) irradiance_[i] = transport_.gather_at(patch, radiosity);
-      const Vec3 reflected = scaled_by(problem_.reflectance[i], irradiance_[i]);
+      const C reflected = scaled_by(problem_.reflectance[i], irradiance_[i]);
       residuals_[i] = problem_.source[i] + reflected - radiosity[i];
-      const Vec3 magnitude = problem_.source[i] + reflected + radiosity[i];
+      const C magnitude = problem_.source[i] + reflected + radiosity[i];
       const double roundings = static_cast<double>(transport_.row_length(patch)) + 4;
       terms_[i] = {largest_component(residuals_[i]), roundings * kRoundoff * max_component(magnitude)};
     }
@@ -120,7 +129,7 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
       report_.residual = std::max(report_.residual, terms_[i].residual);
       rounding_ = std::max(rounding_, terms_[i].rounding);
     }
-    flux_ += areas[i] * mean_component(radiosity[i]);
+    flux_ += areas[i] * mean_of_channels(radiosity[i]);
   }
   const SolveStep now = step_of(report_.residual, flux_);
   report_.error_bound = now.error_bound;
@@ -128,7 +137,8 @@ bool SolveMonitor::look(std::span<const Vec3> radiosity) {
   return true;
 }
 
-bool SolveMonitor::gather(std::span<const Vec3> values, std::span<Vec3> gathered) {
+template <Channels C>
+bool SolveMonitor<C>::gather(std::span<const C> values, std::span<C> gathered) {
   for_each_range(size(), transport_.rows_per_task(), [&](std::size_t begin, std::size_t end) {
     if (stop_.stop_requested()) return;
     for (std::size_t i = begin; i < end; ++i) {
@@ -139,14 +149,16 @@ bool SolveMonitor::gather(std::span<const Vec3> values, std::span<Vec3> gathered
   return !stop_.stop_requested();
 }
 
-SolveStep SolveMonitor::step_of(double residual, double flux) const {
+template <Channels C>
+SolveStep SolveMonitor<C>::step_of(double residual, double flux) const {
   SolveStep step{report_.steps, report_.work, seconds(), residual, (residual + rounding_) / margin_, 0};
   if (step.error_bound > 0) step.relative_error_bound = flux > 0 ? step.error_bound * area_ / flux : kInfinity;
   return step;
 }
 
-void SolveMonitor::record(double residual, double flux, bool always, std::span<const Vec3> radiosity,
-                          std::span<const Vec3> unshot) {
+template <Channels C>
+void SolveMonitor<C>::record(double residual, double flux, bool always, std::span<const C> radiosity,
+                             std::span<const C> unshot) {
   if (!always && report_.steps < next_record_) return;
   const SolveStep step = step_of(residual, flux);
   // A look after steps that were recorded already says it better.
@@ -158,7 +170,8 @@ void SolveMonitor::record(double residual, double flux, bool always, std::span<c
   if (reads_columns(report_.solver)) next_record_ += report_.steps / kRecordsToDoubleSteps;
 }
 
-bool SolveMonitor::goes_on(std::span<const Vec3> radiosity, std::span<const Vec3> unshot) {
+template <Channels C>
+bool SolveMonitor<C>::goes_on(std::span<const C> radiosity, std::span<const C> unshot) {
   report_.status = SolveStatus::kDiverged;
   if (!(margin_ > 0)) return false;
   report_.status = SolveStatus::kCancelled;
@@ -180,19 +193,22 @@ bool SolveMonitor::goes_on(std::span<const Vec3> radiosity, std::span<const Vec3
   return !are_steps_used_up();
 }
 
-bool SolveMonitor::needs_no_look(double residual, double flux, std::span<const Vec3> radiosity,
-                                 std::span<const Vec3> unshot) {
+template <Channels C>
+bool SolveMonitor<C>::needs_no_look(double residual, double flux, std::span<const C> radiosity,
+                                    std::span<const C> unshot) {
   record(residual, flux, false, radiosity, unshot);
   const double bound = (residual + rounding_) / margin_;
   return std::isfinite(bound) && !(flux > 0 && bound * area_ <= options_.relative_tolerance * flux) &&
          !is_cancelled() && seconds() < options_.time_budget_seconds && !are_steps_used_up();
 }
 
-void SolveMonitor::end_without_progress() {
+template <Channels C>
+void SolveMonitor<C>::end_without_progress() {
   report_.status = is_cancelled() ? SolveStatus::kCancelled : SolveStatus::kIterationLimit;
 }
 
-void SolveMonitor::sharpen_bound() {
+template <Channels C>
+void SolveMonitor<C>::sharpen_bound() {
   const bool is_bounded = margin_ > 0 && std::isfinite(report_.error_bound) &&
                           report_.status != SolveStatus::kCancelled && report_.status != SolveStatus::kDiverged;
   // Above this margin the plain bound is at most (2 - margin) / margin < 100 x the error.
@@ -201,32 +217,35 @@ void SolveMonitor::sharpen_bound() {
   std::size_t longest_row = 0;
   for (std::uint32_t i = 0; i < size(); ++i) longest_row = std::max(longest_row, transport_.row_length(i));
 
-  std::vector<Vec3> term(residuals_), sum(residuals_);
+  std::vector<C> term(residuals_), sum(residuals_);
   double rounding = rounding_, magnitudes = report_.residual;
   constexpr int kMaxTerms = 50;
   for (int k = 1; k <= kMaxTerms; ++k) {
     // (rho F)^k r, and the rounding that it adds.
-    rounding += (static_cast<double>(longest_row) + 4) * kRoundoff * largest_component(term);
+    rounding += (static_cast<double>(longest_row) + 4) * kRoundoff * largest_of(term);
     if (!gather(term, irradiance_)) break;
     for (std::size_t i = 0; i < size(); ++i) term[i] = scaled_by(problem_.reflectance[i], irradiance_[i]);
-    const double rest = (largest_component(term) + rounding) / margin_, known = largest_component(sum);
+    const double rest = (largest_of(term) + rounding) / margin_, known = largest_of(sum);
     const double sharp = known + k * kRoundoff * magnitudes + rest;
     if (sharp < report_.error_bound) {
       report_.error_bound = sharp;
       report_.relative_error_bound = flux_ > 0 ? sharp * area_ / flux_ : kInfinity;
     }
-    if (rest <= known / 2 || largest_component(term) <= rounding) break;
+    if (rest <= known / 2 || largest_of(term) <= rounding) break;
     for (std::size_t i = 0; i < size(); ++i) sum[i] += term[i];
-    magnitudes += largest_component(term);
+    magnitudes += largest_of(term);
   }
   if (report_.relative_error_bound <= options_.relative_tolerance) report_.status = SolveStatus::kConverged;
 }
 
-SolveReport SolveMonitor::take_report() {
+template <Channels C>
+SolveReport SolveMonitor<C>::take_report() {
   const auto n = static_cast<std::int64_t>(std::max<std::size_t>(size(), 1));
   report_.sweeps = static_cast<int>(reads_columns(report_.solver) ? report_.steps / n : report_.steps);
   report_.seconds = seconds();
   return std::move(report_);
 }
+template class SolveMonitor<double>;
+template class SolveMonitor<Vec3>;
 
 }  // namespace radbake::radiosity

@@ -14,14 +14,15 @@ constexpr std::size_t kSweepsBetweenLooks = 8;
 
 }  // namespace
 
-void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
+template <Channels C>
+void solve_by_southwell(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   const TransportOperator& transport = monitor.transport();
-  const RadiosityProblem& problem = monitor.problem();
+  const ProblemOf<C>& problem = monitor.problem();
   const std::size_t n = radiosity.size();
   std::optional<LargestKey> largest;
   std::vector<std::uint32_t> patches(n);
   std::vector<double> form_factors, keys(n);
-  std::vector<Vec3> residuals;
+  std::vector<C> residuals;
 
   while (monitor.goes_on(radiosity)) {
     if (!largest) largest.emplace(n);
@@ -44,14 +45,15 @@ void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
       const double own_factor = own != patches.end() && *own == i ? form_factors[own - patches.begin()] : 0;
 
       // Make equation i hold: dB_i = r_i / (1 - rho_i F_ii), and r_j += rho_j F_ji dB_i for all others.
-      const Vec3 rho = problem.reflectance[i], r = residuals[i];
-      const Vec3 change{r.x / (1 - rho.x * own_factor), r.y / (1 - rho.y * own_factor), r.z / (1 - rho.z * own_factor)};
+      const C rho = problem.reflectance[i], r = residuals[i];
+      const C change =
+          by_channel(r, rho, [&](double residual, double own_rho) { return residual / (1 - own_rho * own_factor); });
       radiosity[i] += change;
-      flux += transport.areas()[i] * mean_component(change);
+      flux += transport.areas()[i] * mean_of_channels(change);
       keys.resize(patches.size());
       for (std::size_t k = 0; k < patches.size(); ++k) {
         const std::uint32_t j = patches[k];
-        residuals[j] = j == i ? Vec3{} : residuals[j] + scaled_by(problem.reflectance[j], change * form_factors[k]);
+        residuals[j] = j == i ? C{} : residuals[j] + scaled_by(problem.reflectance[j], change * form_factors[k]);
         keys[k] = largest_component(residuals[j]);
       }
       largest->set(patches, keys);
@@ -66,5 +68,7 @@ void solve_by_southwell(SolveMonitor& monitor, std::vector<Vec3>& radiosity) {
     }
   }
 }
+template void solve_by_southwell(SolveMonitor<double>&, std::vector<double>&);
+template void solve_by_southwell(SolveMonitor<Vec3>&, std::vector<Vec3>&);
 
 }  // namespace radbake::radiosity

@@ -83,12 +83,15 @@ void DenseOperator::column(std::uint32_t j, std::vector<std::uint32_t>& patches,
   }
 }
 
-Vec3 DenseOperator::gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const {
-  Vec3 sum;
+template <Channels C>
+C DenseOperator::gathered(std::uint32_t i, std::span<const C> radiosity) const {
+  C sum{};
   const double* exchange = exchange_row(i);
   for (std::size_t j = 0; j < areas_.size(); ++j) sum += radiosity[j] * (exchange[j] * scale_[j]);
-  return divisors_[i] > 0 ? sum * (scale_[i] / divisors_[i]) : Vec3{};
+  return divisors_[i] > 0 ? sum * (scale_[i] / divisors_[i]) : C{};
 }
+template double DenseOperator::gathered(std::uint32_t, std::span<const double>) const;
+template Vec3 DenseOperator::gathered(std::uint32_t, std::span<const Vec3>) const;
 
 double DenseOperator::row_sum(std::uint32_t i) const {
   double sum = 0;

@@ -23,13 +23,16 @@ class DenseOperator final : public TransportOperator {
 
   void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
   void column(std::uint32_t j, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
-  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override;
+  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override { return gathered(i, radiosity); }
+  double gather_at(std::uint32_t i, std::span<const double> radiosity) const override { return gathered(i, radiosity); }
   double row_sum(std::uint32_t i) const override;
   std::size_t row_length(std::uint32_t i) const override { return row_lengths_[i]; }
   std::span<const double> areas() const override { return areas_; }
 
  private:
   DenseOperator() = default;
+  template <Channels C>
+  C gathered(std::uint32_t i, std::span<const C> radiosity) const;
   const double* exchange_row(std::uint32_t i) const { return exchange_.data() + i * areas_.size(); }
 
   // F_ij = d_i S_ij d_j / divisor_i: of a given matrix, S is F, and d and divisor are 1.

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "common/geometry/vector.h"
+#include "server/radiosity/transport/channels.h"
 
 namespace radbake::radiosity {
 
@@ -27,6 +27,8 @@ class TransportOperator {
 
   /// H_i = sum_j F_ij B_j for one patch. Shapes: radiosity [n].
   virtual Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const = 0;
+  /// One channel of it: the bits that each of three equal ones gets.
+  virtual double gather_at(std::uint32_t i, std::span<const double> radiosity) const = 0;
 
   /// sum_j F_ij
   virtual double row_sum(std::uint32_t i) const = 0;
@@ -40,6 +42,7 @@ class TransportOperator {
   /// H = F B for all patches, rows side by side on the threads; each row is gather_at's, bit for bit.
   /// Shapes: both [n], not the same array.
   virtual void gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const;
+  virtual void gather(std::span<const double> radiosity, std::span<double> irradiance) const;
 
   /// Whether A_i F_ij = A_j F_ji, up to rounding, may be relied on.
   virtual bool is_reciprocal() const { return true; }

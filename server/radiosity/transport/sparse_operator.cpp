@@ -183,13 +183,22 @@ void SparseOperator::column(std::uint32_t j, std::vector<std::uint32_t>& patches
   }
 }
 
-Vec3 SparseOperator::gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const {
-  Vec3 sum;
-  for (std::uint64_t k = first_[i]; k < first_[i + 1]; ++k) {
-    sum += radiosity[patches_[k]] * (exchange_[k] * scale_[patches_[k]]);
+template <Channels C>
+C SparseOperator::gathered(std::uint32_t i, std::span<const C> radiosity) const {
+  // Every solver's time goes here: pointers, so that no index is checked.
+  const C* values = radiosity.data();
+  const double* scale = scale_.data();
+  const ExchangeRow entries = exchange_row(i);
+  const std::uint32_t* patches = entries.patches.data();
+  const float* exchange = entries.exchange.data();
+  C sum{};
+  for (std::size_t k = 0, length = entries.patches.size(); k < length; ++k) {
+    sum += values[patches[k]] * (exchange[k] * scale[patches[k]]);
   }
-  return areas_[i] > 0 ? sum * (scale_[i] / areas_[i]) : Vec3{};
+  return areas_[i] > 0 ? sum * (scale_[i] / areas_[i]) : C{};
 }
+template double SparseOperator::gathered(std::uint32_t, std::span<const double>) const;
+template Vec3 SparseOperator::gathered(std::uint32_t, std::span<const Vec3>) const;
 
 double SparseOperator::row_sum(std::uint32_t i) const { return areas_[i] > 0 ? scaled_row(i) / areas_[i] : 0; }
 

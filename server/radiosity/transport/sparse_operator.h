@@ -49,7 +49,8 @@ class SparseOperator final : public TransportOperator {
 
   void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
   void column(std::uint32_t j, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
-  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override;
+  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override { return gathered(i, radiosity); }
+  double gather_at(std::uint32_t i, std::span<const double> radiosity) const override { return gathered(i, radiosity); }
   double row_sum(std::uint32_t i) const override;
   std::size_t row_length(std::uint32_t i) const override { return first_[i + 1] - first_[i]; }
   std::span<const double> areas() const override { return areas_; }
@@ -58,6 +59,8 @@ class SparseOperator final : public TransportOperator {
   void pair_estimates(const EstimatedRows& rows, const std::stop_token& stop);
   void restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop);
   double scaled_row(std::uint32_t i) const;
+  template <Channels C>
+  C gathered(std::uint32_t i, std::span<const C> radiosity) const;
 
   std::vector<std::uint64_t> first_;
   std::vector<std::uint32_t> patches_;

@@ -35,17 +35,20 @@ void StreamedOperator::column(std::uint32_t j, std::vector<std::uint32_t>& patch
   }
 }
 
-Vec3 StreamedOperator::gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const {
+template <Channels C>
+C StreamedOperator::gathered(std::uint32_t i, std::span<const C> radiosity) const {
   RADBAKE_CHECK(!is_by_columns());
   std::vector<EstimatedRows::Entry> entries;
   const double scale = estimate(i, entries);
-  Vec3 sum;
+  C sum{};
   for (const EstimatedRows::Entry& entry : entries) sum += radiosity[entry.patch] * entry.weight;
   return sum * scale;
 }
+template double StreamedOperator::gathered(std::uint32_t, std::span<const double>) const;
+template Vec3 StreamedOperator::gathered(std::uint32_t, std::span<const Vec3>) const;
 
-void StreamedOperator::gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const {
-  if (!is_by_columns()) return TransportOperator::gather(radiosity, irradiance);
+template <Channels C>
+void StreamedOperator::scatter_columns(std::span<const C> radiosity, std::span<C> irradiance) const {
   RADBAKE_CHECK_EQ(radiosity.size(), size());
   RADBAKE_CHECK_EQ(irradiance.size(), size());
   // Estimate a block of columns side by side, then add them up in order.
@@ -55,7 +58,7 @@ void StreamedOperator::gather(std::span<const Vec3> radiosity, std::span<Vec3> i
     std::vector<double> form_factors;
   };
   std::vector<Column> block(kColumnsPerBlock);
-  std::fill(irradiance.begin(), irradiance.end(), Vec3{});
+  std::fill(irradiance.begin(), irradiance.end(), C{});
   for (std::size_t first = 0; first < size(); first += kColumnsPerBlock) {
     const std::size_t count = std::min(kColumnsPerBlock, size() - first);
     for_each_range(count, rows_per_task(), [&](std::size_t begin, std::size_t end) {
@@ -69,6 +72,16 @@ void StreamedOperator::gather(std::span<const Vec3> radiosity, std::span<Vec3> i
       }
     }
   }
+}
+
+void StreamedOperator::gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const {
+  if (!is_by_columns()) return TransportOperator::gather(radiosity, irradiance);
+  scatter_columns(radiosity, irradiance);
+}
+
+void StreamedOperator::gather(std::span<const double> radiosity, std::span<double> irradiance) const {
+  if (!is_by_columns()) return TransportOperator::gather(radiosity, irradiance);
+  scatter_columns(radiosity, irradiance);
 }
 
 }  // namespace radbake::radiosity

@@ -40,9 +40,11 @@ class StreamedOperator final : public TransportOperator {
   /// F_ij = (A_j / A_i) F_ji of row j, whichever the system is.
   void column(std::uint32_t j, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
   /// With row i. Precondition: the system is by rows (checked).
-  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override;
+  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override { return gathered(i, radiosity); }
+  double gather_at(std::uint32_t i, std::span<const double> radiosity) const override { return gathered(i, radiosity); }
   /// By columns: each row estimated once and scattered, in order.
   void gather(std::span<const Vec3> radiosity, std::span<Vec3> irradiance) const override;
+  void gather(std::span<const double> radiosity, std::span<double> irradiance) const override;
   /// Of row i as it was measured.
   double row_sum(std::uint32_t i) const override { return sums_.measured[i]; }
   std::size_t row_length(std::uint32_t i) const override { return sums_.lengths[i]; }
@@ -54,6 +56,10 @@ class StreamedOperator final : public TransportOperator {
  private:
   /// The entries of row i and what each weight counts.
   double estimate(std::uint32_t i, std::vector<EstimatedRows::Entry>& entries) const;
+  template <Channels C>
+  C gathered(std::uint32_t i, std::span<const C> radiosity) const;
+  template <Channels C>
+  void scatter_columns(std::span<const C> radiosity, std::span<C> irradiance) const;
 
   RowSums sums_;
   RowSource source_;

@@ -33,12 +33,8 @@ class StarOfPatches final : public TransportOperator {
     row(j, patches, form_factors);
     for (double& f : form_factors) f = j == 0 ? 1 : 1.0 / n_;
   }
-  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override {
-    if (i > 0) return radiosity[0];
-    Vec3 sum;
-    for (std::uint32_t j = 1; j <= n_; ++j) sum += radiosity[j] * (1.0 / n_);
-    return sum;
-  }
+  Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override { return gathered(i, radiosity); }
+  double gather_at(std::uint32_t i, std::span<const double> radiosity) const override { return gathered(i, radiosity); }
   double row_sum(std::uint32_t i) const override {
     if (i > 0) return 1;
     double sum = 0;
@@ -49,6 +45,14 @@ class StarOfPatches final : public TransportOperator {
   std::span<const double> areas() const override { return areas_; }
 
  private:
+  template <Channels C>
+  C gathered(std::uint32_t i, std::span<const C> radiosity) const {
+    if (i > 0) return radiosity[0];
+    C sum{};
+    for (std::uint32_t j = 1; j <= n_; ++j) sum += radiosity[j] * (1.0 / n_);
+    return sum;
+  }
+
   std::uint32_t n_;
   std::vector<double> areas_;
 };

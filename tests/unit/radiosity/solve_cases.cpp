@@ -58,6 +58,29 @@ RandomEnclosure random_enclosure(std::size_t n, double max_reflectance, std::uin
   return {dense(exchange, areas), problem};
 }
 
+EstimatedRows sampled_rows(std::uint32_t n, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  EstimatedRows rows;
+  rows.first.push_back(0);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    std::uint32_t counted = 0;
+    for (std::uint32_t j = 0; i + 1 < n && j + 1 < n; ++j) {
+      if (j == i || (i * 7 + j * 7) % 3 != 0) continue;
+      const auto count = static_cast<std::uint32_t>(random() % 20);
+      if (count == 0) continue;
+      rows.entries.push_back({j, static_cast<float>(count)});
+      counted += count;
+    }
+    const auto escaped = counted > 0 ? static_cast<std::uint32_t>(random() % 10) : 0;
+    rows.first.push_back(rows.entries.size());
+    rows.counted.push_back(counted + escaped);
+    rows.escaped.push_back(escaped);
+    rows.absorbed.push_back(0);
+    rows.areas.push_back(i + 1 < n ? 0.1 + static_cast<double>(random() % 100) : 0);
+  }
+  return rows;
+}
+
 RadiosityProblem two_mirrors(double rho) { return {{{1, 1, 1}, {0, 0, 0}}, {{rho, rho, rho}, {rho, rho, rho}}}; }
 
 DenseOperator facing_pair(double form_factor) { return dense({{0, form_factor}, {form_factor, 0}}, {1, 1}); }

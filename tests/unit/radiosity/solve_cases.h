@@ -6,6 +6,7 @@
 
 #include "server/radiosity/solve/solve.h"
 #include "server/radiosity/transport/dense_operator.h"
+#include "server/radiosity/transport/estimated_rows.h"
 
 namespace radbake::radiosity {
 
@@ -28,6 +29,9 @@ struct RandomEnclosure {
   RadiosityProblem problem;
 };
 RandomEnclosure random_enclosure(std::size_t n, double max_reflectance, std::uint64_t seed);
+
+/// Rows of n patches that see a third of each other, with rays that escape; the last patch is buried: no rays, no area.
+EstimatedRows sampled_rows(std::uint32_t n, std::uint64_t seed);
 
 /// Two facing unit patches of one reflectance; the first emits 1.
 RadiosityProblem two_mirrors(double rho);

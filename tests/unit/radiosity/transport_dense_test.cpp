@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "server/radiosity/transport/dense_operator.h"
 #include "server/radiosity/transport/sparse_operator.h"
@@ -10,30 +9,6 @@
 
 namespace radbake::radiosity {
 namespace {
-
-/// Rows of n patches that see a third of each other, with rays that escape; the last patch is buried: no rays, no area.
-EstimatedRows sampled_rows(std::uint32_t n, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  EstimatedRows rows;
-  rows.first.push_back(0);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    std::uint32_t counted = 0;
-    for (std::uint32_t j = 0; i + 1 < n && j + 1 < n; ++j) {
-      if (j == i || (i * 7 + j * 7) % 3 != 0) continue;
-      const auto count = static_cast<std::uint32_t>(random() % 20);
-      if (count == 0) continue;
-      rows.entries.push_back({j, static_cast<float>(count)});
-      counted += count;
-    }
-    const auto escaped = counted > 0 ? static_cast<std::uint32_t>(random() % 10) : 0;
-    rows.first.push_back(rows.entries.size());
-    rows.counted.push_back(counted + escaped);
-    rows.escaped.push_back(escaped);
-    rows.absorbed.push_back(0);
-    rows.areas.push_back(i + 1 < n ? 0.1 + static_cast<double>(random() % 100) : 0);
-  }
-  return rows;
-}
 
 std::vector<Vec3> some_light(std::size_t n) {
   std::vector<Vec3> light;

@@ -86,13 +86,17 @@ class Bake {
     options.max_sweeps = max_sweeps_of(report.plan.survey.max_reflectance, options.relative_tolerance);
     options.max_lu_patches = std::numeric_limits<std::size_t>::max();  // never chosen but by name
     std::vector<Vec3> radiosity = system.problem.source;
-    const SolveObserver show = [this](const SolveView& view) {
+    const auto show = [this](const auto& view) {
       progress_.report(BakeStage::kSolving, static_cast<std::uint64_t>(view.step.steps), 0,
                        view.step.relative_error_bound);
     };
+    // Where all is grey one channel stands for three.
+    const bool is_grey = report.plan.num_channels == 1;
+    const Solver solver = report.plan.solver;
     RADBAKE_ASSIGN_OR_RETURN(
         const SolveReport solved,
-        radiosity::solve(report.plan.solver, *system.transport, system.problem, options, radiosity, show, stop_));
+        is_grey ? solve_grey(solver, *system.transport, system.problem, options, radiosity, show, stop_)
+                : radiosity::solve(solver, *system.transport, system.problem, options, radiosity, show, stop_));
     report.solver = {solver_name(solved.solver),
                      solve_status_name(solved.status),
                      solved.sweeps,

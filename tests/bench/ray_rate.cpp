@@ -40,6 +40,10 @@ class Recorder final : public Visibility {
     shadow.insert(shadow.end(), segments.begin(), segments.end());
     inner_.blocked(segments, blocked);
   }
+  void transmitted(std::span<const Ray> segments, std::span<Vec3> shares) const override {
+    shadow.insert(shadow.end(), segments.begin(), segments.end());
+    inner_.transmitted(segments, shares);
+  }
   void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const override {
     inner_.triangles_near(point, distance, triangles);
   }
@@ -155,7 +159,8 @@ Result<void> run(const std::string& path, const BakeOptions& options, int runs) 
     const HemisphereEstimator estimator(surfaces, patches, visibility, prepared->plan.rays_per_texel);
     const DirectLight direct(surfaces, visibility, kLightSamplesPerTexel);
     const std::vector<Vec3> radiosity(patches.size(), Vec3{1, 1, 1});
-    gather_lightmap({surfaces, visibility, estimator, direct, radiosity, read.scene.sky, 0}, *prepared->atlas, {}, {});
+    const GatherScene scene{surfaces, visibility, estimator, direct, radiosity, {}, read.scene.sky, 0};
+    gather_lightmap(std::span(&scene, 1), *prepared->atlas, {}, {}, {});
   });
   return {};
 }

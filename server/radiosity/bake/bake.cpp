@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include "server/radiosity/bake/pilot.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
 #include "server/radiosity/bake/radiosity_system.h"
@@ -39,10 +40,9 @@ std::vector<SolverSummary::Point> thinned(const std::vector<SolveStep>& history)
 /// One bake, stage after stage, on the threads of the arena that it runs in.
 class Bake {
  public:
-  Bake(const Scene& scene, const BakeOptions& options, const Preparation& prepared, ProgressMeter& progress,
-       std::stop_token stop)
+  Bake(const Scene& scene, const Preparation& prepared, ProgressMeter& progress, std::stop_token stop)
       : scene_(scene),
-        options_(options),
+        options_(prepared.options),
         prepared_(prepared),
         surfaces_(prepared.surveyed.surfaces),
         progress_(progress),
@@ -53,32 +53,77 @@ class Bake {
     outcome_.report.warnings = prepared_.plan.warnings;
     outcome_.report.num_patches = prepared_.patches.size();
 
-    const Visibility& visibility = *prepared_.visibility;
-    outcome_.report.instruction_set = visibility.instruction_set();
-    auto system = make_radiosity_system(
-        prepared_, options_.seed, scene_.sky,
-        [this](std::uint64_t done, std::uint64_t total) { progress_.report(BakeStage::kFormFactors, done, total); },
-        stop_);
-    if (!system.ok()) return system.error();
-    RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> radiosity, solve(**system));
-    system->reset();
+    outcome_.report.instruction_set = prepared_.visibility->instruction_set();
+    const int num_channels = prepared_.num_ray_channels();
+    std::vector<Vec3> radiosity, glow;
+    for (int channel = 0; channel < num_channels; ++channel) {
+      RADBAKE_ASSIGN_OR_RETURN(const Solution own, solve_channel(channel));
+      if (channel == 0) {
+        radiosity = own.radiosity;
+        glow = own.glow;
+        continue;
+      }
+      for (std::size_t i = 0; i < radiosity.size(); ++i) {
+        radiosity[i][channel] = own.radiosity[i][channel];
+        glow[i][channel] = own.glow[i][channel];
+      }
+    }
+    if (!options_.wants_direct && !options_.wants_indirect) glow = {};
 
-    const HemisphereEstimator estimator(surfaces_, prepared_.patches, visibility, prepared_.plan.rays_per_texel);
-    const DirectLight receiver_direct(surfaces_, visibility, kLightSamplesPerTexel);
-    const GatherScene scene{surfaces_, visibility, estimator,     receiver_direct,
-                            radiosity, scene_.sky, options_.seed, outcome_.report.solver.error_bound};
-    if (!gather(scene)) return cancelled();
+    const DirectLight direct(surfaces_, prepared_.shadows(), kLightSamplesPerTexel, Environment::Part::kBright);
+    const double ao_distance = options_.ao_distance > 0 ? options_.ao_distance : kDefaultAoDistance;
+    std::vector<HemisphereEstimator> rows;
+    std::vector<GatherScene> scenes;
+    rows.reserve(static_cast<std::size_t>(num_channels));
+    for (int channel = 0; channel < num_channels; ++channel) {
+      rows.emplace_back(surfaces_, prepared_.patches, prepared_.visibility->channel(channel),
+                        prepared_.plan.rays_per_texel, options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0);
+      scenes.push_back({surfaces_, prepared_.shadows(), rows.back(), direct, radiosity, glow, surfaces_.sky,
+                        options_.seed, outcome_.report.solver.error_bound});
+    }
+    if (!gather(scenes)) return cancelled();
     outcome_.report.stages = progress_.stage_times();
     return std::move(outcome_);
   }
 
  private:
+  /// Shapes: [patches], lx.
+  struct Solution {
+    std::vector<Vec3> radiosity, glow;
+  };
+
+  /// Rows and solve, of what is see-through as one channel meets it. The report shows the last channel.
+  Result<Solution> solve_channel(int channel) {
+    const auto on_row = [this](std::uint64_t done, std::uint64_t total) {
+      progress_.report(BakeStage::kFormFactors, done, total);
+    };
+    RADBAKE_ASSIGN_OR_RETURN(const auto system,
+                             make_radiosity_system(prepared_, options_.seed, channel, on_row, stop_));
+    if (prepared_.num_ray_channels() > 1) keep_channel(channel, *system);
+    Solution solution{{}, system->glow};
+    if (system->transport) {
+      RADBAKE_ASSIGN_OR_RETURN(solution.radiosity, solve(*system));
+    } else {
+      solution.radiosity = solution.glow;
+      outcome_.report.solver.solver = "none";
+      outcome_.report.solver.status = "converged";
+    }
+    return solution;
+  }
+
+  /// The system of a channel: the other two become copies of it.
+  static void keep_channel(int channel, RadiositySystem& system) {
+    for (auto* values : {&system.problem.source, &system.problem.reflectance, &system.glow, &system.direct}) {
+      for (Vec3& value : *values) value = Vec3{1, 1, 1} * value[channel];
+    }
+  }
+
   /// System -> radiosity, with the report's transport, solver and energy.
   Result<std::vector<Vec3>> solve(const RadiositySystem& system) {
     BakeReport& report = outcome_.report;
     progress_.report(BakeStage::kSolving, 0, 0);
-    report.num_row_rays = system.num_row_rays;
-    report.num_light_rays = system.num_light_rays;
+    report.num_row_rays += system.num_row_rays;
+    report.num_light_rays += system.num_light_rays;
     report.transport = system.summary;
     report.warnings.insert(report.warnings.end(), system.warnings.begin(), system.warnings.end());
 
@@ -90,8 +135,8 @@ class Bake {
       progress_.report(BakeStage::kSolving, static_cast<std::uint64_t>(view.step.steps), 0,
                        view.step.relative_error_bound);
     };
-    // Where all is grey one channel stands for three.
-    const bool is_grey = report.plan.num_channels == 1;
+    // Where all is grey, and where each channel has rows of its own, one stands for three.
+    const bool is_grey = report.plan.num_channels == 1 || prepared_.num_ray_channels() > 1;
     const Solver solver = report.plan.solver;
     RADBAKE_ASSIGN_OR_RETURN(
         const SolveReport solved,
@@ -115,7 +160,9 @@ class Bake {
     }
     EnergyTerms terms{radiosity, system.problem.reflectance, system.glow, system.direct, system.direct_variances};
     terms.light_flux = system.emitted_lumens;
-    terms.is_closed = report.transport.escape_share == 0 && report.transport.absorbed_share == 0;
+    // Of a channel by itself the flux of the lights is not known.
+    terms.is_closed =
+        report.transport.escape_share == 0 && report.transport.absorbed_share == 0 && prepared_.num_ray_channels() == 1;
     const EnergyBalance balance = audit_energy(*system.transport, terms);
     report.energy = {balance.is_closed,
                      balance.emitted,
@@ -129,14 +176,14 @@ class Bake {
   }
 
   /// Radiosity -> lightmaps and light by vertex; false when it was stopped.
-  bool gather(const GatherScene& scene) {
+  bool gather(std::span<const GatherScene> channels) {
     const std::uint64_t num_receivers = prepared_.plan.num_texels + prepared_.plan.num_vertex_groups;
     progress_.report(BakeStage::kGathering, 0, num_receivers);
-    if (prepared_.atlas && !gather_texels(scene, *prepared_.atlas, num_receivers)) return false;
+    if (prepared_.atlas && !gather_texels(channels, *prepared_.atlas, num_receivers)) return false;
     GatheredVertices vertices;
     if (prepared_.groups) {
       vertices = gather_vertices(
-          scene, *prepared_.groups,
+          channels, *prepared_.groups,
           [&](std::uint64_t done) {
             progress_.report(BakeStage::kGathering, prepared_.plan.num_texels + done, num_receivers);
           },
@@ -147,10 +194,10 @@ class Bake {
     return true;
   }
 
-  bool gather_texels(const GatherScene& scene, const Atlas& atlas, std::uint64_t num_receivers) {
+  bool gather_texels(std::span<const GatherScene> channels, const Atlas& atlas, std::uint64_t num_receivers) {
     BakeReport& report = outcome_.report;
     GatheredMap map = gather_lightmap(
-        scene, atlas,
+        channels, atlas, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
         [&](const GatheredTile& tile) {
           progress_.tile({tile.sheet, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba, layer_name(tile.sheet),
                           atlas.width(), atlas.height()});
@@ -163,24 +210,15 @@ class Bake {
     report.energy.mean_irradiance = map.mean_irradiance;
 
     LightmapSummary& summary = report.lightmap;
-    const auto sheet_texels = static_cast<std::size_t>(atlas.width()) * atlas.height();
-    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
-      const std::size_t first = sheet_texels * static_cast<std::size_t>(sheet);
-      std::span<float> rgba = std::span(map.rgba).subspan(4 * first, 4 * sheet_texels);
-      const FillCounts counts =
-          fill_from_neighbours(std::span(map.states).subspan(first, sheet_texels), atlas.width(), kPadding, rgba);
-      summary.num_texels_filled += counts.num_filled;
-      summary.num_texels_dilated += counts.num_dilated;
-    }
-    const SeamReport seams = level_seams(surfaces_, atlas.layout(), map.states, map.rgba);
-    summary.num_seam_samples = seams.num_samples;
-    summary.seam_difference_before = seams.difference_before;
-    summary.seam_difference = seams.difference;
-    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
-      const auto first = map.rgba.begin() + static_cast<std::ptrdiff_t>(4 * sheet_texels) * sheet;
-      outcome_.layers.push_back({layer_name(sheet), "irradiance", "lx", atlas.width(), atlas.height(), 4,
-                                 std::vector<float>(first, first + static_cast<std::ptrdiff_t>(4 * sheet_texels))});
-    }
+    const LayerFinish all = finish_layer(atlas, "", "irradiance", "lx", map.states, map.rgba);
+    summary.num_texels_filled = all.fill.num_filled;
+    summary.num_texels_dilated = all.fill.num_dilated;
+    summary.num_seam_samples = all.seams.num_samples;
+    summary.seam_difference_before = all.seams.difference_before;
+    summary.seam_difference = all.seams.difference;
+    if (!map.direct.empty()) finish_layer(atlas, "_direct", "irradiance", "lx", map.states, map.direct);
+    if (!map.indirect.empty()) finish_layer(atlas, "_indirect", "irradiance", "lx", map.states, map.indirect);
+    if (!map.openness.empty()) finish_layer(atlas, "_ao", "openness", "1", map.states, map.openness);
     summary.atlas_size = atlas.width();
     summary.atlas_height = atlas.height();
     summary.num_lightmaps = atlas.num_sheets();
@@ -195,6 +233,34 @@ class Bake {
       summary.num_meshes_unwrapped += mesh.source == UvSource::kUnwrapped;
     }
     return true;
+  }
+
+  /// How a layer was completed.
+  struct LayerFinish {
+    FillCounts fill;
+    SeamReport seams;
+  };
+
+  /// Fills and levels the sheets of a layer and puts them into the outcome. Takes the values.
+  LayerFinish finish_layer(const Atlas& atlas, const std::string& suffix, const char* quantity, const char* unit,
+                           const std::vector<TexelState>& states, std::vector<float>& rgba) {
+    LayerFinish finish;
+    const auto sheet_texels = static_cast<std::size_t>(atlas.width()) * atlas.height();
+    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
+      const std::size_t first = sheet_texels * static_cast<std::size_t>(sheet);
+      const FillCounts counts = fill_from_neighbours(std::span(states).subspan(first, sheet_texels), atlas.width(),
+                                                     kPadding, std::span(rgba).subspan(4 * first, 4 * sheet_texels));
+      finish.fill.num_filled += counts.num_filled;
+      finish.fill.num_dilated += counts.num_dilated;
+    }
+    finish.seams = level_seams(surfaces_, atlas.layout(), states, rgba);
+    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
+      const auto first = rgba.begin() + static_cast<std::ptrdiff_t>(4 * sheet_texels) * sheet;
+      outcome_.layers.push_back({layer_name(sheet) + suffix, quantity, unit, atlas.width(), atlas.height(), 4,
+                                 std::vector<float>(first, first + static_cast<std::ptrdiff_t>(4 * sheet_texels))});
+    }
+    rgba = {};
+    return finish;
   }
 
   static std::string layer_name(int sheet) { return "lightmap_" + std::to_string(sheet); }
@@ -245,7 +311,7 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
   tbb::task_arena arena(threads);
   std::optional<Result<BakeOutcome>> outcome;
   arena.execute([&] {
-    const auto start = ProgressMeter::Clock::now();
+    const ProgressMeter::Start start;
     observer.on_progress({});
     auto prepared = prepare_scene(scene, options, stop);
     if (!prepared.ok()) {
@@ -253,8 +319,13 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
       return;
     }
     const Preparation& ready = **prepared;
+    const Prediction prediction = predict_bake(ready, process_cpu_seconds() - start.cpu_seconds, stop);
     ProgressMeter progress(observer, start, row_rays(ready.plan, ready.patches), gather_rays(ready.plan));
-    outcome.emplace(Bake(scene, options, ready, progress, stop).run());
+    outcome.emplace(Bake(scene, ready, progress, stop).run());
+    if (!outcome->ok()) return;
+    BakeReport& report = (*outcome)->report;
+    report.prediction = prediction;
+    report.costs = measured_costs(report);
   });
   return std::move(*outcome);
 }

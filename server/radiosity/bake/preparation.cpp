@@ -1,15 +1,45 @@
 #include "server/radiosity/bake/preparation.h"
 
+#include <algorithm>
+
 #include "server/radiosity/bake/bake.h"
+#include "server/radiosity/bake/cpu_clock.h"
+#include "server/radiosity/bake/on_threads.h"
+#include "server/radiosity/bake/pilot.h"
+#include "server/radiosity/survey/probe.h"
 
 namespace radbake::radiosity {
+namespace {
 
-Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const BakeOptions& options,
-                                                   std::stop_token stop) {
+/// Decides which effects are simulated, and leaves out of surfaces and options what the others would do.
+Result<void> choose_effects(Preparation& prepared) {
+  BakeOptions& options = prepared.options;
+  const AskedOutputs asked{options.output != Output::kVertices, options.output != Output::kLightmap,
+                           options.wants_direct || options.wants_indirect, options.wants_ao};
+  BakePlan& plan = prepared.plan;
+  RADBAKE_ASSIGN_OR_RETURN(plan.effects, plan_effects(prepared.surveyed.survey, asked, options.effects));
+  const EffectSet effects = effects_on(plan.effects);
+  if (!effects.has(Effect::kVertices)) options.output = Output::kLightmap;
+  if (!effects.has(Effect::kLayers)) options.wants_direct = options.wants_indirect = false;
+  if (!effects.has(Effect::kAmbientOcclusion)) options.wants_ao = false;
+  plan.num_channels = effects.has(Effect::kColor) ? 3 : 1;
+  if (!(effects == prepared.surveyed.surfaces.effects)) prepared.surveyed.surfaces.simulate(effects);
+  if (!has_light(effects)) {
+    plan.warnings.push_back({"no_light_arrives", "no light arrives at any surface: the lightmaps are black"});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const BakeOptions& asked, std::stop_token stop) {
   const Error cancelled{ErrorCode::kCancelled, "the bake was cancelled while it was prepared"};
-  RADBAKE_RETURN_IF_ERROR(check_options(options));
+  RADBAKE_RETURN_IF_ERROR(check_options(asked));
   auto prepared = std::make_unique<Preparation>();
+  prepared->options = asked;
+  const BakeOptions& options = prepared->options;
   RADBAKE_ASSIGN_OR_RETURN(prepared->surveyed, survey_scene(scene));
+  RADBAKE_RETURN_IF_ERROR(choose_effects(*prepared));
   const Surfaces& surfaces = prepared->surveyed.surfaces;
   if (stop.stop_requested()) return cancelled;
 
@@ -26,13 +56,19 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
 
   double area = 0;
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
-    area += surfaces.areas[t] * (surfaces.material(t).is_double_sided ? 2 : 1);
+    // As the file says, so that patches are the same where backs are not simulated.
+    area += surfaces.areas[t] * (scene.materials[surfaces.mesh(t).material].is_double_sided ? 2 : 1);
   }
   const auto max_patches = static_cast<std::size_t>(max_patches_of(options));
   const double reached_density = prepared->atlas ? prepared->atlas->texels_per_meter() : density;
   const double texel_edge = 1 / (reached_density * surfaces.metres_per_unit);
-  prepared->visibility = make_embree_visibility(surfaces.corners, stop);
+  for (std::uint32_t t = 0; t < surfaces.size() && !prepared->opacity; ++t) {
+    if (surfaces.is_see_through(t)) prepared->opacity = std::make_unique<SurfaceOpacity>(surfaces);
+  }
+  prepared->visibility = make_embree_visibility(surfaces.corners, stop, prepared->opacity.get());
   if (!prepared->visibility || stop.stop_requested()) return cancelled;
+  if (!surfaces.effects.has(Effect::kOcclusion)) prepared->unblocked = make_unblocked(*prepared->visibility);
+  probe_escape(surfaces, *prepared->visibility, prepared->surveyed.survey);
   prepared->patches =
       make_patches(surfaces, *prepared->visibility, {patch_edge(texel_edge, area, max_patches), max_patches, stop});
   if (stop.stop_requested()) return cancelled;
@@ -49,10 +85,11 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.num_patches = prepared->patches.size();
   plan.rays_per_texel = options.rays > 0 ? options.rays : kDefaultRays;
   plan.rays_per_row = plan.rays_per_texel;
-  plan.light_samples_per_texel = plan.survey.num_emitter_triangles > 0 ? kLightSamplesPerTexel : 0;
+  plan.light_samples_per_texel =
+      std::count(surfaces.is_emitter.begin(), surfaces.is_emitter.end(), 1) > 0 ? kLightSamplesPerTexel : 0;
   choose_methods(options, plan);
   plan.texels_per_meter = reached_density;
-  plan.warnings = prepared->surveyed.warnings;
+  plan.warnings.insert(plan.warnings.begin(), prepared->surveyed.warnings.begin(), prepared->surveyed.warnings.end());
   plan.warnings.insert(plan.warnings.end(), layout_warnings.begin(), layout_warnings.end());
   if (prepared->patches.num_uncut() > 0) {
     plan.warnings.push_back({"contacts_not_cut", std::to_string(prepared->patches.num_uncut()) +
@@ -64,8 +101,13 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
 }
 
 Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, std::stop_token stop) {
-  RADBAKE_ASSIGN_OR_RETURN(const std::unique_ptr<Preparation> prepared, prepare_scene(scene, options, stop));
-  return PlannedBake{prepared->plan, {}};
+  return on_threads(options.threads, [&]() -> Result<PlannedBake> {
+    const double start = process_cpu_seconds();
+    RADBAKE_ASSIGN_OR_RETURN(const std::unique_ptr<Preparation> prepared, prepare_scene(scene, options, stop));
+    const Prediction prediction = predict_bake(*prepared, process_cpu_seconds() - start, stop);
+    if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the plan was cancelled"};
+    return PlannedBake{prepared->plan, prediction};
+  });
 }
 
 }  // namespace radbake::radiosity

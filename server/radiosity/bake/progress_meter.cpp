@@ -24,8 +24,8 @@ double seconds(std::chrono::steady_clock::duration d) { return std::chrono::dura
 
 }  // namespace
 
-ProgressMeter::ProgressMeter(BakeObserver& observer, Clock::time_point start, double row_rays, double gather_rays)
-    : observer_(observer), start_(start), stage_start_(start) {
+ProgressMeter::ProgressMeter(BakeObserver& observer, const Start& start, double row_rays, double gather_rays)
+    : observer_(observer), start_(start.wall), stage_start_(start.wall), stage_cpu_start_(start.cpu_seconds) {
   const double traced = std::max(row_rays + gather_rays, 1.0);
   row_share_ = (1 - kPreparingShare - kSolvingShare) * row_rays / traced;
   gather_share_ = (1 - kPreparingShare - kSolvingShare) * gather_rays / traced;
@@ -34,8 +34,10 @@ ProgressMeter::ProgressMeter(BakeObserver& observer, Clock::time_point start, do
 void ProgressMeter::enter(BakeStage stage) {
   if (stage == stage_) return;
   const Clock::time_point now = Clock::now();
-  times_.push_back({stage_name(stage_), seconds(now - stage_start_)});
+  const double cpu = process_cpu_seconds();
+  times_.push_back({stage_name(stage_), seconds(now - stage_start_), cpu - stage_cpu_start_});
   stage_start_ = now;
+  stage_cpu_start_ = cpu;
   stage_ = stage;
 }
 
@@ -80,7 +82,7 @@ void ProgressMeter::tile(const Tile& tile) {
 std::vector<StageTime> ProgressMeter::stage_times() {
   const std::scoped_lock lock(mutex_);
   std::vector<StageTime> times = times_;
-  times.push_back({stage_name(stage_), seconds(Clock::now() - stage_start_)});
+  times.push_back({stage_name(stage_), seconds(Clock::now() - stage_start_), process_cpu_seconds() - stage_cpu_start_});
   return times;
 }
 

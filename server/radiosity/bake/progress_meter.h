@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "server/radiosity/bake/bake.h"
+#include "server/radiosity/bake/cpu_clock.h"
 
 namespace radbake::radiosity {
 
@@ -13,14 +14,20 @@ class ProgressMeter {
  public:
   using Clock = std::chrono::steady_clock;
 
+  /// When a bake began: the wall clock and this process's CPU seconds.
+  struct Start {
+    Clock::time_point wall = Clock::now();
+    double cpu_seconds = process_cpu_seconds();
+  };
+
   /// The bake began at `start`; it is prepared and its rays are known by now.
-  ProgressMeter(BakeObserver& observer, Clock::time_point start, double row_rays, double gather_rays);
+  ProgressMeter(BakeObserver& observer, const Start& start, double row_rays, double gather_rays);
 
   /// From any thread. Calls the observer at most about 20 times a second, and at the end of each stage.
   void report(BakeStage stage, std::uint64_t done, std::uint64_t total, double residual = 0);
   /// Calls the observer with a tile, apart from all other calls.
   void tile(const Tile& tile);
-  /// The times of the stages that have ended and of the one that runs.
+  /// The wall and CPU times of the stages that have ended and of the one that runs.
   std::vector<StageTime> stage_times();
 
  private:
@@ -34,6 +41,7 @@ class ProgressMeter {
   BakeStage stage_ = BakeStage::kPreparing;
   Clock::time_point start_;
   Clock::time_point stage_start_;
+  double stage_cpu_start_;
   Clock::time_point last_report_{};
   std::vector<StageTime> times_;
 };

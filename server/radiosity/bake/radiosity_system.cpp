@@ -9,17 +9,17 @@
 #include "server/radiosity/form_factor/analytic_rows.h"
 #include "server/radiosity/form_factor/hemicube_rows.h"
 #include "server/radiosity/form_factor/hemisphere_rows.h"
+#include "server/radiosity/threads/for_each_range.h"
 #include "server/radiosity/transport/dense_operator.h"
 #include "server/radiosity/transport/sparse_operator.h"
 #include "server/radiosity/transport/streamed_operator.h"
 
 namespace radbake::radiosity {
-namespace {
 
-std::unique_ptr<RowEstimator> make_estimator(const Preparation& prepared) {
+std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, int channel) {
   const Surfaces& surfaces = prepared.surveyed.surfaces;
   const Patches& patches = prepared.patches;
-  const Visibility& visibility = *prepared.visibility;
+  const Visibility& visibility = prepared.visibility->channel(channel);
   const BakePlan& plan = prepared.plan;
   switch (plan.form_factors) {
     case FormFactors::kAnalytic:
@@ -33,6 +33,8 @@ std::unique_ptr<RowEstimator> make_estimator(const Preparation& prepared) {
   }
   return std::make_unique<HemisphereRows>(surfaces, patches, visibility, plan.rays_per_row);
 }
+
+namespace {
 
 struct TakenRow {
   FormFactorRow row;  ///< without entries where they are not kept
@@ -58,6 +60,17 @@ void fill_light(const std::vector<TakenRow>& rows, Vec3 sky, RadiositySystem& sy
   }
 }
 
+/// What the patches send by themselves, where nothing is reflected.
+void fill_glow(std::size_t num_patches, RadiositySystem& system) {
+  system.glow.resize(num_patches);
+  for_each_range(num_patches, 64, [&](std::size_t begin, std::size_t end) {
+    PatchScratch scratch = system.sampler->make_scratch();
+    for (std::size_t patch = begin; patch < end; ++patch) {
+      system.glow[patch] = system.sampler->glow(static_cast<std::uint32_t>(patch), scratch);
+    }
+  });
+}
+
 /// Warns of meshes more than half of whose light meets the backs of single-sided surfaces: reversed normals, or a place
 /// inside something else.
 void warn_of_backs(const Preparation& prepared, const std::vector<TakenRow>& rows, std::vector<Warning>& warnings) {
@@ -67,8 +80,9 @@ void warn_of_backs(const Preparation& prepared, const std::vector<TakenRow>& row
     const auto& [row, sample, length] = rows[i];
     const std::uint32_t mesh = surfaces.meshes[prepared.patches.pieces(i).front().triangle];
     const double seen = row.counted > 0 ? sample.visible_share * (1 - row.absorbed / row.counted) : 0;
-    areas[mesh] += prepared.patches.area(i);
-    absorbed[mesh] += prepared.patches.area(i) * (1 - seen);
+    const double area = prepared.patches.area(i) * sample.opaque_share;
+    areas[mesh] += area;
+    absorbed[mesh] += area * (1 - seen);
   }
   constexpr std::size_t kMostNames = 3;
   std::size_t count = 0;
@@ -117,7 +131,9 @@ EstimatedRows collected(const Patches& patches, double square_metres, std::vecto
     all.counted.push_back(row.counted);
     all.escaped.push_back(row.escaped);
     all.absorbed.push_back(row.absorbed);
-    all.areas.push_back(row.counted > 0 ? patches.area(i) * rows[i].sample.visible_share * square_metres : 0);
+    const PatchSample& sample = rows[i].sample;
+    const double share = sample.visible_share * sample.opaque_share;
+    all.areas.push_back(row.counted > 0 ? patches.area(i) * share * square_metres : 0);
     row.entries = {};
   }
   return all;
@@ -164,15 +180,20 @@ std::unique_ptr<TransportOperator> make_streamed(const EstimatedRows& rows, cons
 }  // namespace
 
 Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
-    const Preparation& prepared, std::uint64_t seed, Vec3 sky,
+    const Preparation& prepared, std::uint64_t seed, int channel,
     const std::function<void(std::uint64_t, std::uint64_t)>& on_row, std::stop_token stop) {
   const Surfaces& surfaces = prepared.surveyed.surfaces;
   const Patches& patches = prepared.patches;
   auto system = std::make_unique<RadiositySystem>();
-  system->estimator = make_estimator(prepared);
-  system->direct_light = std::make_unique<DirectLight>(surfaces, *prepared.visibility, kLightSamplesPerPatch);
-  system->sampler = std::make_unique<PatchSampler>(surfaces, patches, *system->estimator, *system->direct_light, seed);
+  system->estimator = make_row_estimator(prepared, channel);
+  system->direct_light = std::make_unique<DirectLight>(surfaces, prepared.shadows(), kLightSamplesPerPatch);
+  system->sampler =
+      std::make_unique<PatchSampler>(surfaces, patches, *system->estimator, *system->direct_light, seed, channel);
   system->emitted_lumens = system->direct_light->emitted_lumens();
+  if (!surfaces.effects.has(Effect::kInterreflection)) {
+    fill_glow(patches.size(), *system);
+    return system;
+  }
 
   // Estimate the rows, and the light on each patch.
   const bool is_streamed = prepared.plan.transport == Transport::kStreamed;
@@ -187,7 +208,7 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
       },
       on_row, stop);
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
-  fill_light(rows, sky, *system);
+  fill_light(rows, surfaces.sky, *system);
   warn_of_backs(prepared, rows, system->warnings);
   warn_of_uncertain_rows(rows, system->warnings);
 

@@ -33,12 +33,17 @@ struct RadiositySystem {
   std::unique_ptr<PatchSampler> sampler;
 };
 
-/// Estimates the rows of a prepared scene and puts the operator together.
+/// The estimator of a plan's rows, as a channel of what is see-through meets the scene.
+std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, int channel);
+
+/// Estimates the rows of a prepared scene and puts the operator together. `channel`: of what is see-through; 0 where
+/// all channels meet the same.
 ///
+/// Without interreflection there are no rows and no operator, only E_in of each patch.
 /// on_row as in sample_patches(). A streamed operator stops estimating when `stop` is requested, later on too.
 /// Errors: kCancelled.
 Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
-    const Preparation& prepared, std::uint64_t seed, Vec3 sky,
+    const Preparation& prepared, std::uint64_t seed, int channel,
     const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row, std::stop_token stop);
 
 }  // namespace radbake::radiosity

@@ -50,7 +50,9 @@ void HemisphereEstimator::deal_rays(std::span<const Site> sites, std::uint64_t s
 
 void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch,
                                      RowSample& row) const {
-  row = {std::move(row.arrivals), 0, 0, 0, 0, std::move(row.is_buried), std::move(row.of_site), 1};
+  row = {std::move(row.arrivals),  std::move(row.escapes), 0, 0, 0, 0,
+         std::move(row.is_buried), std::move(row.of_site), 1};
+  row.escapes.clear();
   row.is_buried.assign(sites.size(), 0);
   row.of_site.assign(sites.size(), {});
   deal_rays(sites, seed, scratch);
@@ -66,8 +68,9 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
   for (std::size_t s = 0; s < sites.size(); ++s) {
     RowSample::SiteRays own;
     own.first_arrival = num_arrivals;
+    own.first_escape = static_cast<std::uint32_t>(row.escapes.size());
     own.counted = static_cast<std::uint32_t>(scratch.end_of_site[s] - k);
-    std::uint32_t absorbed = 0;
+    std::uint32_t absorbed = 0, enclosing = 0;
     for (; k < scratch.end_of_site[s]; ++k) {
       const Hit& hit = scratch.hits[k];
       if (k + kAhead < scratch.hits.size() && scratch.hits[k + kAhead].triangle != kNoHit) {
@@ -75,18 +78,25 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
       }
       if (hit.triangle == kNoHit) {
         ++own.escaped;
+        row.escapes.push_back(static_cast<std::uint32_t>(k));
         continue;
       }
+      own.near += hit.distance < near_distance_;
       const Patches::Meeting met = patches_.meet(hit, scratch.rays[k].direction, surfaces_);
       own.backs += met.is_back;
-      absorbed += met.patch == kNoPatch;
+      if (met.patch == kNoPatch) {
+        ++absorbed;
+        // Who is under a sheet that light passes is not inside of anything.
+        enclosing += !surfaces_.is_see_through(hit.triangle);
+      }
       row.arrivals[num_arrivals] = met.patch;
       num_arrivals += met.patch != kNoPatch;
     }
-    if (2 * absorbed > own.counted) {
+    if (2 * enclosing > own.counted) {
       row.is_buried[s] = 1;
       ++num_buried;
       num_arrivals = own.first_arrival;
+      row.escapes.resize(own.first_escape);
       continue;
     }
     own.num_arrivals = num_arrivals - own.first_arrival;

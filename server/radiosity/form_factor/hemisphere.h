@@ -16,12 +16,15 @@ struct RowSample {
   /// Of one site's rays; none where it is buried.
   struct SiteRays {
     std::uint32_t first_arrival = 0, num_arrivals = 0;
+    std::uint32_t first_escape = 0;
     std::uint32_t escaped = 0;
+    std::uint32_t near = 0;  ///< rays that met anything within the asked distance
     std::uint32_t counted = 0;
     std::uint32_t backs = 0;  ///< rays that met a back, of single- or double-sided surfaces
   };
   std::vector<std::uint32_t> arrivals;  ///< patch of each ray that met one, in the order of the rays
-  std::uint32_t escaped = 0;            ///< rays that met nothing: the row's share of the sky
+  std::vector<std::uint32_t> escapes;   ///< rays that met nothing, into Scratch::rays, in their order
+  std::uint32_t escaped = 0;            ///< their number: the row's share of the sky
   std::uint32_t absorbed = 0;           ///< rays that met the back of a single-sided surface
   std::uint32_t counted = 0;            ///< rays from sites that are not buried
   std::uint32_t traced = 0;
@@ -36,14 +39,19 @@ struct RowSample {
 ///
 /// The rays of one row are a scrambled Sobol sequence over the hemisphere, dealt to the sites in runs. Hits,
 /// escapes and absorptions sum to the rays counted by construction. A site is *buried* when more than half of its rays
-/// meet the back of single-sided surfaces: it lies inside other geometry, and its rays do not count. Rays about an
-/// interpolated normal that leave below the surface are rejected and do not count either.
-/// Errors: variance of F_ij is at most F (1 - F) / rays.
-/// Source: Malley's method; the directions are those of CosineDirections.
+/// meet the back of single-sided opaque surfaces: it lies inside other geometry, and its rays do not count. Rays about
+/// an interpolated normal that leave below the surface are rejected and do not count either. Errors: variance of F_ij
+/// is at most F (1 - F) / rays. Source: Malley's method; the directions are those of CosineDirections.
 class HemisphereEstimator {
  public:
-  HemisphereEstimator(const Surfaces& surfaces, const Patches& patches, const Visibility& visibility, int rays)
-      : surfaces_(surfaces), patches_(patches), visibility_(visibility), directions_(rays) {}
+  /// `near_distance`: rays that meet anything within are counted apart, scene units; 0: none.
+  HemisphereEstimator(const Surfaces& surfaces, const Patches& patches, const Visibility& visibility, int rays,
+                      double near_distance = 0)
+      : surfaces_(surfaces),
+        patches_(patches),
+        visibility_(visibility),
+        directions_(rays),
+        near_distance_(static_cast<float>(near_distance)) {}
 
   int rays() const { return directions_.size(); }
   /// How many sites a receiver should have for this number of rays.
@@ -67,6 +75,7 @@ class HemisphereEstimator {
   const Patches& patches_;
   const Visibility& visibility_;
   CosineDirections directions_;
+  float near_distance_;
 };
 
 }  // namespace radbake::radiosity

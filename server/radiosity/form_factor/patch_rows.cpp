@@ -20,31 +20,62 @@ constexpr std::size_t kRowsPerTask = 4;
 }  // namespace
 
 PatchSampler::PatchSampler(const Surfaces& surfaces, const Patches& patches, const RowEstimator& estimator,
-                           const DirectLight& direct, std::uint64_t seed)
+                           const DirectLight& direct, std::uint64_t seed, int channel)
     : surfaces_(surfaces),
       patches_(patches),
       estimator_(estimator),
       direct_(direct),
       seed_(seed),
+      channel_(channel),
       site_points_(estimator.num_sites()) {}
 
-void PatchSampler::sample_row(std::uint32_t patch, PatchScratch& scratch, const std::stop_token& stop,
-                              FormFactorRow& row) const {
-  // Spread the sites over the patch.
+void PatchSampler::place_sites(std::uint32_t patch, PatchScratch& scratch) const {
   const auto seeds = SobolPoints::seeds_of(seed_of(seed_, kSitesOfPatch, patch));
   scratch.sites.clear();
+  scratch.opaque_share = 1;
+  double opacities = 0;
+  std::vector<Site> opaque;
+  bool is_see_through = false;
   for (int s = 0; s < site_points_.size(); ++s) {
     const SurfacePoint p =
         patches_.sample(patch, site_points_.coordinate(s, 0, seeds), site_points_.coordinate(s, 1, seeds));
-    scratch.sites.push_back(side_site(surfaces_, p, patches_.normal(patch, p, surfaces_)));
+    const Site& site = scratch.sites.emplace_back(side_site(surfaces_, p, patches_.normal(patch, p, surfaces_)));
+    if (!surfaces_.is_see_through(p.triangle)) {
+      opaque.push_back(site);
+      opacities += 1;
+      continue;
+    }
+    is_see_through = true;
+    const double opacity = surfaces_.opacity(p)[channel_];
+    opacities += opacity;
+    if (site_points_.coordinate(s, 2, seeds) < opacity) opaque.push_back(site);
   }
-  estimator_.estimate(patch, scratch.sites, seed_of(seed_, kRaysOfPatch, patch), *scratch.row, stop, row,
-                      scratch.is_buried);
+  scratch.is_buried.assign(scratch.sites.size(), 0);
+  if (!is_see_through) return;
+  // Put sites that are opaque in the place of those that are not.
+  scratch.opaque_share = opaque.empty() ? 0 : opacities / static_cast<double>(scratch.sites.size());
+  for (std::size_t s = 0; s < scratch.sites.size() && !opaque.empty(); ++s) {
+    scratch.sites[s] = opaque[s % opaque.size()];
+  }
+}
+
+void PatchSampler::sample_row(std::uint32_t patch, PatchScratch& scratch, const std::stop_token& stop,
+                              FormFactorRow& row) const {
+  place_sites(patch, scratch);
+  if (scratch.opaque_share > 0) {
+    estimator_.estimate(patch, scratch.sites, seed_of(seed_, kRaysOfPatch, patch), *scratch.row, stop, row,
+                        scratch.is_buried);
+  } else {
+    row = {};
+    scratch.is_buried.assign(scratch.sites.size(), 1);
+  }
 }
 
 PatchSample PatchSampler::sample_light(std::uint32_t patch, PatchScratch& scratch) const {
   // Average the material over the part that is not buried.
   PatchSample sample;
+  sample.opaque_share = scratch.opaque_share;
+  if (scratch.opaque_share <= 0) return sample;
   int visible = 0;
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
     if (scratch.is_buried[s]) continue;
@@ -68,6 +99,15 @@ PatchSample PatchSampler::sample_light(std::uint32_t patch, PatchScratch& scratc
     sample.direct_variance += difference * difference / (kDirectReplicates * (kDirectReplicates - 1));
   }
   return sample;
+}
+
+Vec3 PatchSampler::glow(std::uint32_t patch, PatchScratch& scratch) const {
+  place_sites(patch, scratch);
+  Vec3 sum;
+  for (const Site& site : scratch.sites) {
+    if (!surfaces_.is_emitter[site.point.triangle]) sum += surfaces_.exitance(site.point);
+  }
+  return scratch.opaque_share > 0 ? sum / static_cast<double>(scratch.sites.size()) : Vec3{};
 }
 
 void sample_patches(const PatchSampler& sampler, std::size_t num_fronts,

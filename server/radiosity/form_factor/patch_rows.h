@@ -15,6 +15,7 @@ namespace radbake::radiosity {
 /// What a patch is as a sender and receiver, averaged over its visible part.
 struct PatchSample {
   double visible_share = 0;  ///< of its sites: those not buried; 0: the patch was never reached, or is buried
+  double opaque_share = 1;   ///< of its area: what stops light, reflects and emits
   std::uint32_t light_rays = 0;
   Vec3 reflectance;
   Vec3 glow;                   ///< E_in, lx
@@ -26,19 +27,23 @@ struct PatchSample {
 struct PatchScratch {
   std::vector<Site> sites;
   std::vector<std::uint8_t> is_buried;
+  double opaque_share = 1;
   std::unique_ptr<RowScratch> row;
   DirectLight::Scratch light;
 };
 
 /// Samples patches: their rows, and what they do with light. The same patch gives the same bits at any time, so that a
 /// row can be thrown away and made again.
+///
+/// Of a patch that light passes in part, only what is opaque counts: its sites are chosen among those with a
+/// probability of their opacity in `channel`, and its area is opaque_share of the whole.
 class PatchSampler {
  public:
   PatchSampler(const Surfaces& surfaces, const Patches& patches, const RowEstimator& estimator,
-               const DirectLight& direct, std::uint64_t seed);
+               const DirectLight& direct, std::uint64_t seed, int channel = 0);
 
   std::size_t size() const { return patches_.size(); }
-  PatchScratch make_scratch() const { return {{}, {}, estimator_.make_scratch(), {}}; }
+  PatchScratch make_scratch() const { return {{}, {}, 1, estimator_.make_scratch(), {}}; }
 
   /// The form factors of a patch.
   void sample_row(std::uint32_t patch, PatchScratch& scratch, const std::stop_token& stop, FormFactorRow& row) const;
@@ -46,12 +51,19 @@ class PatchSampler {
   /// Material and light of the patch whose row scratch was used for last.
   PatchSample sample_light(std::uint32_t patch, PatchScratch& scratch) const;
 
+  /// E_in of a patch, lx, for who needs no row of it: buried parts are not told from others.
+  Vec3 glow(std::uint32_t patch, PatchScratch& scratch) const;
+
  private:
+  /// Spreads sites over the opaque part of a patch.
+  void place_sites(std::uint32_t patch, PatchScratch& scratch) const;
+
   const Surfaces& surfaces_;
   const Patches& patches_;
   const RowEstimator& estimator_;
   const DirectLight& direct_;
   std::uint64_t seed_;
+  int channel_;  ///< of the opacity
   SobolPoints site_points_;
 };
 

@@ -22,15 +22,24 @@ struct Scratch {
 };
 
 struct Texel {
-  Vec3 irradiance;
+  Vec3 irradiance, indirect;
+  double openness = 0;
   double coverage = 0;
   double area = 0;
   TexelState state = TexelState::kOutside;
   std::uint64_t rays = 0, light_rays = 0;
 };
 
-Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoints& site_points, int x, int y,
-                   Scratch& scratch) {
+/// Writes a texel of a layer, where the layer is kept.
+void put(Vec3 value, double coverage, std::size_t at, std::vector<float>& rgba) {
+  if (rgba.empty()) return;
+  for (int c = 0; c < 3; ++c) rgba[4 * at + static_cast<std::size_t>(c)] = static_cast<float>(value[c]);
+  rgba[4 * at + 3] = static_cast<float>(coverage);
+}
+
+Texel gather_texel(std::span<const GatherScene> channels, const Atlas& atlas, const SobolPoints& site_points, int x,
+                   int y, Scratch& scratch) {
+  const GatherScene& scene = channels.front();
   Texel texel;
   atlas.footprint(x, y, scratch.footprint);
   if (scratch.footprint.is_empty()) return texel;
@@ -46,9 +55,11 @@ Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoin
         scratch.footprint.sample(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds));
     scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
   }
-  const Reception reception =
-      receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
+  const Reception reception = receive_channels(channels, seed_of(scene.seed, kRaysOfTexel, id),
+                                               seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
   texel.irradiance = reception.irradiance;
+  texel.indirect = reception.indirect;
+  texel.openness = reception.openness;
   texel.state = reception.is_buried ? TexelState::kBuried : TexelState::kValid;
   texel.rays = reception.rays;
   texel.light_rays = reception.light_rays;
@@ -57,16 +68,19 @@ Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoin
 
 }  // namespace
 
-GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas,
+GatheredMap gather_lightmap(std::span<const GatherScene> channels, const Atlas& atlas, GatherLayers layers,
                             const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop) {
   const int width = atlas.width(), height = atlas.height();
   const int edge = std::max(width, height) > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
   const int tiles_across = (width + edge - 1) / edge, tiles_down = (height + edge - 1) / edge;
   const std::size_t num_texels = static_cast<std::size_t>(atlas.num_rows()) * width;
-  const SobolPoints site_points(scene.rows.num_sites());
+  const SobolPoints site_points(channels.front().rows.num_sites());
 
   GatheredMap map;
   map.rgba.assign(num_texels * 4, 0.0f);
+  if (layers.direct) map.direct.assign(num_texels * 4, 0.0f);
+  if (layers.indirect) map.indirect.assign(num_texels * 4, 0.0f);
+  if (layers.openness) map.openness.assign(num_texels * 4, 0.0f);
   map.states.assign(num_texels, TexelState::kOutside);
   struct TileSums {
     std::uint64_t rays = 0, light_rays = 0;
@@ -90,11 +104,16 @@ GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas,
     for (int y = first_row; y < first_row + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         if (stop.stop_requested()) return;
-        const Texel texel = gather_texel(scene, atlas, site_points, x, y, scratch);
+        const Texel texel = gather_texel(channels, atlas, site_points, x, y, scratch);
         const std::size_t at = static_cast<std::size_t>(y) * width + x;
         map.states[at] = texel.state;
-        for (int c = 0; c < 3; ++c) map.rgba[4 * at + c] = static_cast<float>(texel.irradiance[c]);
-        map.rgba[4 * at + 3] = static_cast<float>(texel.coverage);
+        put(texel.irradiance, texel.coverage, at, map.rgba);
+        // What is not indirect: rounding must not make it negative.
+        const Vec3 direct = texel.irradiance - texel.indirect;
+        put({std::max(direct.x, 0.0), std::max(direct.y, 0.0), std::max(direct.z, 0.0)}, texel.coverage, at,
+            map.direct);
+        put(texel.indirect, texel.coverage, at, map.indirect);
+        put(Vec3{1, 1, 1} * texel.openness, texel.coverage, at, map.openness);
         own.rays += texel.rays;
         own.light_rays += texel.light_rays;
         texels += texel.state != TexelState::kOutside;

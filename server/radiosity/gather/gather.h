@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -21,7 +22,9 @@ struct GatheredTile {
 
 /// Gathered lightmaps, sheets stacked, before they are filled.
 struct GatheredMap {
-  std::vector<float> rgba;         ///< [num_rows * width * 4] irradiance, lx, and coverage
+  std::vector<float> rgba;  ///< [num_rows * width * 4] irradiance, lx, and coverage
+  // The same shape, where they are asked for: lx, lx, and openness in each channel.
+  std::vector<float> direct, indirect, openness;
   std::vector<TexelState> states;  ///< [num_rows * width]
   std::uint64_t num_rays = 0;
   std::uint64_t num_light_rays = 0;
@@ -29,9 +32,15 @@ struct GatheredMap {
   bool is_cancelled = false;
 };
 
+/// Parts of the light that are kept beside all of it.
+struct GatherLayers {
+  bool direct = false, indirect = false, openness = false;
+};
+
 /// Final gather: receive() over the footprint of each texel. A buried texel is invalid. Tiles are reported as they
 /// finish, one call at a time, in any order; the map does not depend on that order.
-GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas,
+/// Shapes: channels, 1: all channels are received together; 3: each as its own scene gives it (coloured sheets).
+GatheredMap gather_lightmap(std::span<const GatherScene> channels, const Atlas& atlas, GatherLayers layers,
                             const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop);
 
 }  // namespace radbake::radiosity

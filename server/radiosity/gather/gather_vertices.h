@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -22,8 +23,8 @@ struct GatheredVertices {
 
 /// Final gather: receive() over the quarter of each incident triangle that lies next to the vertex.
 ///
-/// on_done is called from any thread with the number of groups done.
-GatheredVertices gather_vertices(const GatherScene& scene, const VertexGroups& groups,
+/// Shapes: channels as of gather_lightmap(). on_done is called from any thread with the number of groups done.
+GatheredVertices gather_vertices(std::span<const GatherScene> channels, const VertexGroups& groups,
                                  const std::function<void(std::uint64_t)>& on_done, std::stop_token stop);
 
 }  // namespace radbake::radiosity

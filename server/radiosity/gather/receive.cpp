@@ -122,28 +122,43 @@ class Parting {
   std::vector<std::uint32_t> targets_;
 };
 
+/// What the light at a receiver consists of.
+struct Light {
+  Vec3 all, indirect;
+  double openness = 0;
+};
+
 /// The light at the sites that are not out, from the row that was traced for them.
-Vec3 irradiance_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
-  // Gather what the patches reflect, and the sky.
-  Vec3 sum;
-  std::uint64_t escaped = 0, counted = 0;
+Light light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+  // Gather what the patches send, and the sky.
+  Vec3 sum, glow, sky;
+  std::uint64_t escaped = 0, counted = 0, near = 0;
+  const Environment* environment = scene.direct.environment();
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
     if (scratch.is_out[s]) continue;
     const RowSample::SiteRays& own = scratch.row.of_site[s];
     for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
-      sum += scene.radiosity[scratch.row.arrivals[own.first_arrival + k]];
+      const std::uint32_t patch = scratch.row.arrivals[own.first_arrival + k];
+      sum += scene.radiosity[patch];
+      if (!scene.glow.empty()) glow += scene.glow[patch];
+    }
+    for (std::uint32_t k = 0; k < own.escaped && environment != nullptr; ++k) {
+      const auto& d = scratch.hemisphere.rays[scratch.row.escapes[own.first_escape + k]].direction;
+      sky += environment->dim_luminance({d[0], d[1], d[2]});
     }
     escaped += own.escaped;
     counted += own.counted;
+    near += own.near;
   }
   if (counted == 0) return {};
-  sum += scene.sky * (std::numbers::pi * static_cast<double>(escaped));
+  const auto num = static_cast<double>(counted);
+  sky += scene.sky * static_cast<double>(escaped);
 
   // Add what the lights send straight.
   Vec3 direct;
   out.light_rays +=
       scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light, std::span(&direct, 1));
-  return sum / static_cast<double>(counted) + direct;
+  return {(sum + sky * std::numbers::pi) / num + direct, (sum - glow) / num, 1 - static_cast<double>(near) / num};
 }
 
 /// Leaves all parts out but the darkest of those that are large enough to be measured.
@@ -161,7 +176,7 @@ void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, Recei
   for (std::uint32_t part = 0; part < sizes.size(); ++part) {
     if (sizes[part] < kMinVisibleShare * static_cast<double>(scratch.sites.size())) continue;
     keep(part);
-    const double light = mean_component(irradiance_of(scene, light_seed, scratch, out));
+    const double light = max_component(light_of(scene, light_seed, scratch, out).all);
     if (light >= least) continue;
     least = light;
     kept = part;
@@ -203,8 +218,31 @@ Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64
     trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
   }
 
-  out.irradiance = irradiance_of(scene, light_seed, scratch, out);
+  const Light light = light_of(scene, light_seed, scratch, out);
+  out.irradiance = light.all;
+  out.indirect = light.indirect;
+  out.openness = light.openness;
   out.is_buried = false;
+  return out;
+}
+
+Reception receive_channels(std::span<const GatherScene> channels, std::uint64_t rays_seed, std::uint64_t light_seed,
+                           ReceiveScratch& scratch) {
+  if (channels.size() == 1) return receive(channels.front(), rays_seed, light_seed, scratch);
+  Reception out;
+  out.is_buried = false;
+  const std::vector<Site> sites = scratch.sites;  // receive() may change them
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    scratch.sites = sites;
+    const Reception own = receive(channels[c], rays_seed, light_seed, scratch);
+    const int channel = static_cast<int>(c);
+    out.irradiance[channel] = own.irradiance[channel];
+    out.indirect[channel] = own.indirect[channel];
+    out.openness += own.openness / static_cast<double>(channels.size());
+    out.is_buried |= own.is_buried;
+    out.rays += own.rays;
+    out.light_rays += own.light_rays;
+  }
   return out;
 }
 

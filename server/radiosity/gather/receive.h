@@ -17,6 +17,7 @@ struct GatherScene {
   const HemisphereEstimator& rows;
   const DirectLight& direct;
   std::span<const Vec3> radiosity;  ///< [patches] B'
+  std::span<const Vec3> glow;       ///< [patches] E_in, the part of B' that is not reflected
   Vec3 sky;                         ///< luminance, nit
   std::uint64_t seed = 0;
   double dark = 0;  ///< radiosity up to this is none: what the solver cannot tell from 0, lx
@@ -25,6 +26,8 @@ struct GatherScene {
 /// Light that arrives at one receiver.
 struct Reception {
   Vec3 irradiance;        ///< mean over the part that counts, lx
+  Vec3 indirect;          ///< of it what surfaces reflect, lx
+  double openness = 0;    ///< cosine-weighted share of directions in which nothing is within the rows' near distance
   bool is_buried = true;  ///< most of it lies inside other geometry: irradiance means nothing
   std::uint64_t rays = 0, light_rays = 0;
 };
@@ -44,11 +47,18 @@ struct ReceiveScratch {
 /// Gathers the light at scratch.sites, which are spread over one receiver.
 ///
 ///   H = sum_j F_j B'_j + F_sky pi L_sky + H^direct       over the visible part
+///   H^indirect = sum_j F_j (B'_j - E_in_j)
 ///
+/// Of a sky of every direction, rays that escape bring the dim part, H^direct the bright one.
 /// A site does not count where it is buried: inside a single-sided object, or inside a closed object of any kind that
 /// no light enters (the ground under a box that stands on it). Where something thin stands across the receiver, only
 /// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
 /// of a wall, or a mean of both, would be a leak. `rays_seed`, `light_seed`: what the receiver is.
 Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch);
+
+/// As receive() where all channels are received together; each by a scene of its own where there are three.
+/// A receiver is buried where it is in any channel.
+Reception receive_channels(std::span<const GatherScene> channels, std::uint64_t rays_seed, std::uint64_t light_seed,
+                           ReceiveScratch& scratch);
 
 }  // namespace radbake::radiosity

@@ -13,6 +13,11 @@ namespace {
 /// Up to this many emitter triangles are weighed at each receiver; beyond it they are chosen by power alone.
 constexpr std::size_t kMaxWeighedEmitters = 1024;
 
+/// Numbers that keep the seeds of lights apart; the emitters have the receiver's own.
+enum Purpose : std::uint64_t { kSun = 31, kEnvironment = 32 };
+
+bool has_disc(const DirectionalLight& sun) { return sun.angular_diameter_radians > 0; }
+
 std::array<float, 3> to_float(Vec3 v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
@@ -38,8 +43,9 @@ double spot_falloff(const SpotLight& spot, double cosine) {
 
 }  // namespace
 
-DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility, int samples)
+DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility, int samples, Environment::Part part)
     : surfaces_(surfaces), visibility_(visibility), points_(samples) {
+  if (surfaces.environment != nullptr) environment_.emplace(*surfaces.environment, part);
   double sum = 0;
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
     if (!surfaces.is_emitter[t]) continue;
@@ -84,11 +90,28 @@ std::uint64_t DirectLight::estimate(std::span<const Site> sites, std::span<const
   scratch.replicate_of.clear();
   if (!emitters_.empty()) sample_emitters(open, seed, scratch, replicates.size());
   sample_lamps(open, scratch, replicates.size());
+  std::uint64_t purpose = 0;
+  for (const Light& light : surfaces_.lights) {
+    const auto* sun = std::get_if<DirectionalLight>(&light.kind);
+    if (sun == nullptr || !has_disc(*sun)) continue;
+    sample_sun(*sun, open, seed_of(seed, kSun, purpose++), scratch, replicates.size());
+  }
+  if (has_sampled_environment()) {
+    sample_environment(open, seed_of(seed, kEnvironment, 0), scratch, replicates.size());
+  }
 
-  scratch.blocked.resize(scratch.segments.size());
-  visibility_.blocked(scratch.segments, scratch.blocked);
-  for (std::size_t i = 0; i < scratch.segments.size(); ++i) {
-    if (!scratch.blocked[i]) replicates[scratch.replicate_of[i]] += scratch.contributions[i];
+  if (visibility_.is_see_through()) {
+    scratch.transmitted.resize(scratch.segments.size());
+    visibility_.transmitted(scratch.segments, scratch.transmitted);
+    for (std::size_t i = 0; i < scratch.segments.size(); ++i) {
+      replicates[scratch.replicate_of[i]] += scaled_by(scratch.contributions[i], scratch.transmitted[i]);
+    }
+  } else {
+    scratch.blocked.resize(scratch.segments.size());
+    visibility_.blocked(scratch.segments, scratch.blocked);
+    for (std::size_t i = 0; i < scratch.segments.size(); ++i) {
+      if (!scratch.blocked[i]) replicates[scratch.replicate_of[i]] += scratch.contributions[i];
+    }
   }
   return scratch.segments.size();
 }
@@ -141,7 +164,9 @@ void DirectLight::sample_emitters(const std::vector<const Site*>& sites, std::ui
       const auto from = lifted_origin(surfaces_, site.position, site.facing, site.point.triangle);
       const auto to = lifted_origin(surfaces_, surfaces_.position(source), facing, t);
       scratch.segments.push_back({from, {to[0] - from[0], to[1] - from[1], to[2] - from[2]}, 1.0f});
-      scratch.contributions.push_back(surfaces_.exitance(source) * weight);
+      const Vec3 exitance = surfaces_.exitance(source) * weight;
+      scratch.contributions.push_back(surfaces_.is_see_through(t) ? scaled_by(exitance, surfaces_.opacity(source))
+                                                                  : exitance);
       scratch.replicate_of.push_back(static_cast<std::uint32_t>(r));
     }
   }
@@ -153,39 +178,81 @@ void DirectLight::sample_lamps(const std::vector<const Site*>& sites, Scratch& s
   const bool is_shared_out = sites.size() % num_replicates == 0;
   const std::size_t per_replicate = is_shared_out ? sites.size() / num_replicates : sites.size();
   for (const Light& light : surfaces_.lights) {
+    const auto* sun = std::get_if<DirectionalLight>(&light.kind);
+    if (sun != nullptr && has_disc(*sun)) continue;
     for (std::size_t r = 0; r < num_replicates; ++r) {
       for (std::size_t k = 0; k < per_replicate; ++k) {
         const Site& site = *sites[is_shared_out ? r * per_replicate + k : k];
-        Vec3 direction, contribution;
-        float max_distance = 1;
-        if (const auto* sun = std::get_if<DirectionalLight>(&light.kind)) {
-          direction = -sun->direction;
-          contribution = sun->illuminance * receiving_cosine(site, direction);
-          max_distance = std::numeric_limits<float>::infinity();
-        } else {
-          const auto* point = std::get_if<PointLight>(&light.kind);
-          const auto* spot = std::get_if<SpotLight>(&light.kind);
-          const Vec3 at = ((point ? point->position : spot->position) - surfaces_.centre) / surfaces_.metres_per_unit;
-          direction = at - site.position;
-          const double distance = length(direction);
-          if (distance <= 0) continue;
-          const Vec3 unit = direction / distance;
-          const double metres = distance * surfaces_.metres_per_unit;
-          const Vec3 intensity =
-              point ? point->intensity : spot->intensity * spot_falloff(*spot, dot(-unit, spot->direction));
-          contribution = intensity * (receiving_cosine(site, unit) / (metres * metres));
+        if (sun != nullptr) {
+          const Vec3 contribution = sun->illuminance * receiving_cosine(site, -sun->direction);
+          add_ray(site, -sun->direction, contribution / static_cast<double>(per_replicate), r, scratch);
+          continue;
         }
+        const auto* point = std::get_if<PointLight>(&light.kind);
+        const auto* spot = std::get_if<SpotLight>(&light.kind);
+        const Vec3 at = ((point ? point->position : spot->position) - surfaces_.centre) / surfaces_.metres_per_unit;
+        const Vec3 direction = at - site.position;
+        const double distance = length(direction);
+        if (distance <= 0) continue;
+        const Vec3 unit = direction / distance;
+        const double metres = distance * surfaces_.metres_per_unit;
+        const Vec3 intensity =
+            point ? point->intensity : spot->intensity * spot_falloff(*spot, dot(-unit, spot->direction));
+        const Vec3 contribution = intensity * (receiving_cosine(site, unit) / (metres * metres));
         if (max_component(contribution) <= 0) continue;
+        // Aim from the lifted origin at the lamp itself.
+        const Vec3 lift = site.facing * surfaces_.ray_offsets[site.point.triangle];
         const auto from = lifted_origin(surfaces_, site.position, site.facing, site.point.triangle);
-        scratch.segments.push_back({from, to_float(direction), max_distance});
-        if (max_distance == 1) {
-          // Aim from the lifted origin at the lamp itself.
-          const Vec3 lift = site.facing * surfaces_.ray_offsets[site.point.triangle];
-          scratch.segments.back().direction = to_float(direction - lift);
-        }
+        scratch.segments.push_back({from, to_float(direction - lift), 1});
         scratch.contributions.push_back(contribution / static_cast<double>(per_replicate));
         scratch.replicate_of.push_back(static_cast<std::uint32_t>(r));
       }
+    }
+  }
+}
+
+void DirectLight::add_ray(const Site& site, Vec3 direction, Vec3 contribution, std::size_t replicate,
+                          Scratch& scratch) const {
+  if (max_component(contribution) <= 0) return;
+  scratch.segments.push_back({lifted_origin(surfaces_, site.position, site.facing, site.point.triangle),
+                              to_float(direction), std::numeric_limits<float>::infinity()});
+  scratch.contributions.push_back(contribution);
+  scratch.replicate_of.push_back(static_cast<std::uint32_t>(replicate));
+}
+
+void DirectLight::sample_sun(const DirectionalLight& sun, const std::vector<const Site*>& sites, std::uint64_t seed,
+                             Scratch& scratch, std::size_t num_replicates) const {
+  const Frame towards(-sun.direction);
+  const double sine = std::sin(sun.angular_diameter_radians / 2);
+  const std::size_t samples = std::max<std::size_t>(1, static_cast<std::size_t>(points_.size()) / 2 / num_replicates);
+  for (std::size_t r = 0; r < num_replicates; ++r) {
+    const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + r));
+    for (std::size_t k = 0; k < samples; ++k) {
+      const Site& site = *sites[site_of_sample(r, k, samples, sites.size())];
+      // A disc of radius sin(alpha) lifted onto the sphere: density cos(gamma) / (pi sin^2 alpha).
+      const double radius = sine * std::sqrt(points_.coordinate(static_cast<int>(k), 0, seeds));
+      const double around = 2 * std::numbers::pi * points_.coordinate(static_cast<int>(k), 1, seeds);
+      const double cosine = std::sqrt(1 - radius * radius);
+      const Vec3 direction = towards.to_world({radius * std::cos(around), radius * std::sin(around), cosine});
+      const double weight = receiving_cosine(site, direction) / (cosine * static_cast<double>(samples));
+      add_ray(site, direction, sun.illuminance * weight, r, scratch);
+    }
+  }
+}
+
+void DirectLight::sample_environment(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
+                                     std::size_t num_replicates) const {
+  const std::size_t samples = static_cast<std::size_t>(points_.size()) / num_replicates;
+  for (std::size_t r = 0; r < num_replicates; ++r) {
+    const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + r));
+    for (std::size_t k = 0; k < samples; ++k) {
+      const Site& site = *sites[site_of_sample(r, k, samples, sites.size())];
+      const Environment::Sample sample = environment_->sample(points_.coordinate(static_cast<int>(k), 0, seeds),
+                                                              points_.coordinate(static_cast<int>(k), 1, seeds));
+      if (!(sample.density > 0)) continue;
+      // H = L cos / (p n).
+      const double weight = receiving_cosine(site, sample.direction) / (sample.density * static_cast<double>(samples));
+      add_ray(site, sample.direction, sample.luminance * weight, r, scratch);
     }
   }
 }

@@ -75,7 +75,8 @@ void Surfaces::find_emitters(const SobolPoints& points) {
   is_emitter.assign(size(), 0);
   for (std::uint32_t t = 0; t < size(); ++t) {
     const Material& own = material(t);
-    const int sides = own.is_double_sided ? 2 : 1;
+    // As the file says, so that the same surfaces are emitters where backs are not simulated.
+    const int sides = scene->materials[mesh(t).material].is_double_sided ? 2 : 1;
     area += areas[t] * sides;
     if (max_component(own.emissive) <= 0) continue;
     const auto exitance_at = [this](const SurfacePoint& p) { return exitance_in_detail(p); };

@@ -1,5 +1,6 @@
 #include "server/radiosity/survey/surfaces.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "server/radiosity/survey/texture.h"
@@ -12,14 +13,17 @@ T interpolated(const std::vector<T>& values, const std::array<std::uint32_t, 3>&
   return values[vertices[0]] * (1 - p.u - p.v) + values[vertices[1]] * p.u + values[vertices[2]] * p.v;
 }
 
+Vec2 texture_coordinate(const Surfaces& surfaces, const SurfacePoint& p, const TextureReference& reference) {
+  const Mesh& mesh = surfaces.mesh(p.triangle);
+  const auto& texcoord = reference.texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1;
+  return reference.transform.apply(interpolated(texcoord, surfaces.vertices(p.triangle), p));
+}
+
 Vec3 textured(const Surfaces& surfaces, const SurfacePoint& p, Vec3 factor,
               const std::optional<TextureReference>& reference) {
   if (!reference) return factor;
-  const Mesh& mesh = surfaces.mesh(p.triangle);
-  const auto& texcoord = reference->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1;
-  const Vec2 uv = interpolated(texcoord, surfaces.vertices(p.triangle), p);
-  return scaled_by(factor,
-                   sampled_texture(surfaces.scene->textures[reference->texture], reference->transform.apply(uv)));
+  return scaled_by(factor, sampled_texture(surfaces.scene->textures[reference->texture],
+                                           texture_coordinate(surfaces, p, *reference)));
 }
 
 }  // namespace
@@ -44,9 +48,46 @@ Vec3 Surfaces::corner_normal(std::uint32_t triangle, int corner) const {
 Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
   if (!mean_reflectances.empty()) return mean_reflectances[p.triangle];
   const Material& own = material(p.triangle);
-  const Vec3 reflectance = textured(*this, p, own.reflectance, own.reflectance_texture);
+  Vec3 reflectance = textured(*this, p, own.reflectance, own.reflectance_texture);
   const std::vector<Vec3>& colors = mesh(p.triangle).colors;
-  return colors.empty() ? reflectance : scaled_by(reflectance, interpolated(colors, vertices(p.triangle), p));
+  if (!colors.empty()) reflectance = scaled_by(reflectance, interpolated(colors, vertices(p.triangle), p));
+  if (max_component(own.transmittance) <= 0) return reflectance;
+  const Vec3 passed = textured(*this, p, own.transmittance, own.reflectance_texture);
+  for (int c = 0; c < 3; ++c) reflectance[c] = passed[c] < 1 ? reflectance[c] / (1 - passed[c]) : 0;
+  return reflectance;
+}
+
+Vec3 Surfaces::opacity(const SurfacePoint& p) const {
+  const Material& own = material(p.triangle);
+  double coverage = 1;
+  if (own.alpha_mode != AlphaMode::kOpaque) {
+    coverage = own.alpha;
+    if (own.reflectance_texture) {
+      coverage *= sampled_opacity(scene->textures[own.reflectance_texture->texture],
+                                  texture_coordinate(*this, p, *own.reflectance_texture));
+    }
+    coverage =
+        own.alpha_mode == AlphaMode::kMask ? (coverage >= own.alpha_cutoff ? 1.0 : 0.0) : std::min(coverage, 1.0);
+  }
+  if (max_component(own.transmittance) <= 0) return Vec3{1, 1, 1} * coverage;
+  return (Vec3{1, 1, 1} - textured(*this, p, own.transmittance, own.reflectance_texture)) * coverage;
+}
+
+bool Surfaces::has_coloured_tint() const {
+  const auto is_grey = [](Vec3 v) { return v.x == v.y && v.y == v.z; };
+  std::vector<std::uint8_t> is_used(materials.size(), 0);
+  for (const Mesh& mesh : scene->meshes) is_used[mesh.material] = 1;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    const Material& own = materials[m];
+    if (!is_used[m] || max_component(own.transmittance) <= 0) continue;
+    if (!is_grey(own.transmittance)) return true;
+    if (!own.reflectance_texture) continue;
+    const TexturePlane& texture = scene->textures[own.reflectance_texture->texture];
+    for (std::size_t at = 0; at < texture.values.size(); at += static_cast<std::size_t>(texture.channels)) {
+      if (!is_grey({texture.values[at], texture.values[at + 1], texture.values[at + 2]})) return true;
+    }
+  }
+  return false;
 }
 
 Vec3 Surfaces::exitance(const SurfacePoint& p) const {

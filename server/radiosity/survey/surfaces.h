@@ -64,7 +64,18 @@ class Surfaces {
   Vec3 corner_normal(std::uint32_t triangle, int corner) const;
   /// Leaves out what an effect that is not in the set would do, and finds the emitters among what is left.
   void simulate(const EffectSet& set);
-  /// Reflectance there: factor times texture times the vertices' colours, each channel in [0, 1).
+  /// Whether light passes any part of a triangle: it is masked, blended or a tinted sheet.
+  bool is_see_through(std::uint32_t triangle) const {
+    const Material& own = material(triangle);
+    return own.alpha_mode != AlphaMode::kOpaque || max_component(own.transmittance) > 0;
+  }
+  /// Share of the light that stops there, by channel: coverage (1 or 0 of a mask, alpha of a blend) times
+  /// (1 - transmittance). Of the surface, that share reflects and emits.
+  Vec3 opacity(const SurfacePoint& p) const;
+  /// Whether a tinted sheet stops channels by different shares.
+  bool has_coloured_tint() const;
+  /// Reflectance of what is opaque there: factor times texture times the vertices' colours over 1 - transmittance, each
+  /// channel in [0, 1).
   Vec3 reflectance(const SurfacePoint& p) const;
   /// Exitance there: pi times factor times texture, lx.
   Vec3 exitance(const SurfacePoint& p) const;

@@ -21,21 +21,31 @@ int wrapped(double texel, int size, Wrap wrap) {
   return index >= 0 && index < size ? static_cast<int>(index) : 0;
 }
 
-}  // namespace
-
-Vec3 sampled_texture(const TexturePlane& texture, Vec2 uv) {
+/// What lies between four texels: read(texel), a pointer to its channels, gives the value of one.
+template <typename Read>
+auto between_texels(const TexturePlane& texture, Vec2 uv, const Read& read) {
   // Texel centres lie at half numbers.
   const double x = uv.x * texture.width - 0.5, y = uv.y * texture.height - 0.5;
   const double x0 = std::floor(x), y0 = std::floor(y);
   const auto texel = [&](int dx, int dy) {
     const int column = wrapped(x0 + dx, texture.width, texture.wrap_s);
     const int row = wrapped(y0 + dy, texture.height, texture.wrap_t);
-    const float* value = &texture.values[(static_cast<std::size_t>(row) * texture.width + column) * texture.channels];
-    return Vec3{value[0], value[1], value[2]};
+    return read(&texture.values[(static_cast<std::size_t>(row) * texture.width + column) * texture.channels]);
   };
   // Between equal texels this form gives that value itself, to the last bit.
-  const auto between = [](Vec3 a, Vec3 b, double share) { return a + (b - a) * share; };
+  const auto between = [](auto a, auto b, double share) { return a + (b - a) * share; };
   return between(between(texel(0, 0), texel(1, 0), x - x0), between(texel(0, 1), texel(1, 1), x - x0), y - y0);
+}
+
+}  // namespace
+
+Vec3 sampled_texture(const TexturePlane& texture, Vec2 uv) {
+  return between_texels(texture, uv, [](const float* value) { return Vec3{value[0], value[1], value[2]}; });
+}
+
+double sampled_opacity(const TexturePlane& texture, Vec2 uv) {
+  if (texture.channels < 4) return 1;
+  return between_texels(texture, uv, [](const float* value) { return static_cast<double>(value[3]); });
 }
 
 }  // namespace radbake::radiosity

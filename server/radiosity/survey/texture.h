@@ -8,4 +8,7 @@ namespace radbake::radiosity {
 /// Colour of a texture at a coordinate, bilinear between texel centres, wrapped as the texture says. Linear light.
 Vec3 sampled_texture(const TexturePlane& texture, Vec2 uv);
 
+/// Its fourth channel, in the same way; 1 where it has none.
+double sampled_opacity(const TexturePlane& texture, Vec2 uv);
+
 }  // namespace radbake::radiosity

@@ -13,16 +13,42 @@ Vec3 to_double(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
 class BruteForceVisibility final : public Visibility {
  public:
-  explicit BruteForceVisibility(std::span<const Corners> triangles) : triangles_(triangles.begin(), triangles.end()) {}
+  BruteForceVisibility(std::span<const Corners> triangles, const Opacity* opacity, int channel)
+      : triangles_(triangles.begin(), triangles.end()), opacity_(opacity), channel_(channel) {
+    if (opacity == nullptr || channel > 0) return;
+    for (int c = 1; c < 3; ++c) others_[c - 1] = std::make_unique<BruteForceVisibility>(triangles, opacity, c);
+  }
 
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const override {
     RADBAKE_CHECK_EQ(rays.size(), hits.size());
-    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = nearest(rays[i]);
+    const Chances chances(rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      hits[i] = {};
+      for (const Hit& hit : crossings(rays[i])) {
+        const bool is_nearer = hit.distance < hits[i].distance;
+        if (is_nearer && chances.of(i, hit.triangle) < opacity_of(hit)[channel_]) hits[i] = hit;
+      }
+    }
   }
+
+  void transmitted(std::span<const Ray> segments, std::span<Vec3> shares) const override {
+    RADBAKE_CHECK_EQ(segments.size(), shares.size());
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+      shares[i] = {1, 1, 1};
+      for (const Hit& hit : crossings(segments[i])) shares[i] = scaled_by(shares[i], Vec3{1, 1, 1} - opacity_of(hit));
+    }
+  }
+
+  bool is_see_through() const override { return opacity_ != nullptr; }
+  const Visibility& channel(int c) const override { return c == 0 || !others_[c - 1] ? *this : *others_[c - 1]; }
 
   void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const override {
     RADBAKE_CHECK_EQ(segments.size(), blocked.size());
-    for (std::size_t i = 0; i < segments.size(); ++i) blocked[i] = nearest(segments[i]).triangle != kNoHit;
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+      const std::vector<Hit> hits = crossings(segments[i]);
+      blocked[i] =
+          std::any_of(hits.begin(), hits.end(), [&](const Hit& hit) { return max_component(opacity_of(hit)) > 0; });
+    }
   }
 
   void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const override {
@@ -63,10 +89,15 @@ class BruteForceVisibility final : public Visibility {
     return {low, high};
   }
 
-  Hit nearest(const Ray& ray) const {
+  Vec3 opacity_of(const Hit& hit) const {
+    if (opacity_ == nullptr || !opacity_->is_see_through(hit.triangle)) return {1, 1, 1};
+    return opacity_->opacity(hit.triangle, hit.u, hit.v);
+  }
+
+  /// All that a ray crosses, by triangle.
+  std::vector<Hit> crossings(const Ray& ray) const {
     const Vec3 origin = to_double(ray.origin), direction = to_double(ray.direction);
-    Hit best;
-    double best_t = ray.max_distance;
+    std::vector<Hit> hits;
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
       // Solve origin + t d = a + u (b - a) + v (c - a) by Cramer's rule.
       const auto& [a, b, c] = triangles_[i];
@@ -75,20 +106,23 @@ class BruteForceVisibility final : public Visibility {
       if (determinant == 0) continue;
       const Vec3 s = origin - a, q = cross(s, e1);
       const double u = dot(s, p) / determinant, v = dot(direction, q) / determinant, t = dot(e2, q) / determinant;
-      if (u < 0 || v < 0 || u + v > 1 || t < 0 || t >= best_t) continue;
-      best_t = t;
-      best = {static_cast<std::uint32_t>(i), static_cast<float>(u), static_cast<float>(v)};
+      if (u < 0 || v < 0 || u + v > 1 || t < 0 || t >= ray.max_distance) continue;
+      hits.push_back(
+          {static_cast<std::uint32_t>(i), static_cast<float>(u), static_cast<float>(v), static_cast<float>(t)});
     }
-    return best;
+    return hits;
   }
 
   std::vector<Corners> triangles_;
+  const Opacity* opacity_;
+  int channel_;
+  std::array<std::unique_ptr<BruteForceVisibility>, 2> others_;
 };
 
 }  // namespace
 
-std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles) {
-  return std::make_unique<BruteForceVisibility>(triangles);
+std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles, const Opacity* opacity) {
+  return std::make_unique<BruteForceVisibility>(triangles, opacity, 0);
 }
 
 }  // namespace radbake::radiosity

@@ -2,6 +2,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/check.h"
 #include "server/radiosity/visibility/visibility.h"
@@ -39,29 +40,20 @@ void set_lane(Packet& packet, int k, const Ray& ray) {
   packet.tfar[k] = ray.max_distance;
 }
 
-class EmbreeVisibility final : public Visibility {
+/// Embree's tree: one geometry of the opaque triangles, and one of those that are see-through, with callbacks.
+class Tree {
  public:
-  EmbreeVisibility(std::span<const Corners> triangles, const std::stop_token& stop) {
+  Tree(std::span<const Corners> triangles, const std::stop_token& stop, const Opacity* opacity) : opacity_(opacity) {
     device_ = rtcNewDevice(nullptr);
     RADBAKE_CHECK(device_ != nullptr);
     scene_ = rtcNewScene(device_);
     rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                 3 * sizeof(float), 3 * triangles.size()));
-    auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                   3 * sizeof(unsigned), triangles.size()));
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-      for (int corner = 0; corner < 3; ++corner) {
-        const std::size_t at = 3 * t + corner;
-        for (int axis = 0; axis < 3; ++axis) vertices[3 * at + axis] = static_cast<float>(triangles[t][corner][axis]);
-        indices[at] = static_cast<unsigned>(at);
-      }
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      ids_[opacity != nullptr && opacity->is_see_through(t)].push_back(t);
     }
-    vertices_ = vertices;
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene_, geometry);
-    rtcReleaseGeometry(geometry);
+    for (int kind = 0; kind < 2; ++kind) {
+      if (!ids_[kind].empty()) attach(triangles, kind);
+    }
     // Build on one thread: ties between coplanar triangles are decided by the tree's order, and a tree that was built
     // by several threads may order its leaves by chance. Not rtcJoinCommitScene(): that works in an arena of its own.
     tbb::task_arena one_thread(1);
@@ -76,23 +68,122 @@ class EmbreeVisibility final : public Visibility {
     RADBAKE_CHECK(!is_built_ || error == RTC_ERROR_NONE);
   }
 
-  bool is_built() const { return is_built_; }
-
-  ~EmbreeVisibility() override {
+  ~Tree() {
     rtcReleaseScene(scene_);
     rtcReleaseDevice(device_);
   }
-  EmbreeVisibility(const EmbreeVisibility&) = delete;
-  EmbreeVisibility& operator=(const EmbreeVisibility&) = delete;
+  Tree(const Tree&) = delete;
+  Tree& operator=(const Tree&) = delete;
+
+  bool is_built() const { return is_built_; }
+  bool is_see_through() const { return !ids_[kSeeThrough].empty(); }
+  RTCScene scene() const { return scene_; }
+  RTCDevice device() const { return device_; }
+  const Opacity* opacity() const { return opacity_; }
+  std::uint32_t triangle(unsigned geometry, unsigned primitive) const { return ids_[geometry][primitive]; }
+  /// Nine numbers.
+  const float* corners(unsigned geometry, unsigned primitive) const {
+    return vertices_[geometry] + 9 * std::size_t{primitive};
+  }
+
+ private:
+  static constexpr int kSeeThrough = 1;
+
+  void attach(std::span<const Corners> triangles, int kind) {
+    const std::vector<std::uint32_t>& ids = ids_[kind];
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), 3 * ids.size()));
+    auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                   3 * sizeof(unsigned), ids.size()));
+    for (std::size_t t = 0; t < ids.size(); ++t) {
+      for (int corner = 0; corner < 3; ++corner) {
+        const std::size_t at = 3 * t + corner;
+        const Vec3 position = triangles[ids[t]][corner];
+        for (int axis = 0; axis < 3; ++axis) vertices[3 * at + axis] = static_cast<float>(position[axis]);
+        indices[at] = static_cast<unsigned>(at);
+      }
+    }
+    vertices_[kind] = vertices;
+    if (kind == kSeeThrough) {
+      rtcSetGeometryIntersectFilterFunction(geometry, pass_or_stop);
+      rtcSetGeometryOccludedFilterFunction(geometry, weaken);
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(scene_, geometry, static_cast<unsigned>(kind));
+    rtcReleaseGeometry(geometry);
+  }
+
+  static void pass_or_stop(const RTCFilterFunctionNArguments* args);
+  static void weaken(const RTCFilterFunctionNArguments* args);
+
+  const Opacity* opacity_;
+  std::array<std::vector<std::uint32_t>, 2> ids_;  ///< triangle of each primitive, by geometry
+  std::array<const float*, 2> vertices_{};         ///< [9 x primitives], of the geometries
+  RTCDevice device_ = nullptr;
+  RTCScene scene_ = nullptr;
+  bool is_built_ = false;
+};
+
+/// What the callbacks are told of a packet.
+struct PacketContext {
+  RTCIntersectContext base;  // first: Embree hands it back by this address
+  const Tree* tree;
+  int channel;
+  Chances chances;
+  std::size_t first;  ///< ray of the batch that is the packet's first
+  Vec3* transmitted;  ///< [kPacket] by RTCRayN_id; null: whether anything stands there is all that is asked
+};
+
+/// Lets a ray through with the probability 1 - opacity.
+void Tree::pass_or_stop(const RTCFilterFunctionNArguments* args) {
+  const auto& context = *reinterpret_cast<const PacketContext*>(args->context);
+  for (unsigned k = 0; k < args->N; ++k) {
+    if (args->valid[k] != -1) continue;
+    const std::uint32_t triangle = context.tree->triangle(kSeeThrough, RTCHitN_primID(args->hit, args->N, k));
+    const Vec3 opacity =
+        context.tree->opacity_->opacity(triangle, RTCHitN_u(args->hit, args->N, k), RTCHitN_v(args->hit, args->N, k));
+    const std::size_t ray = context.first + RTCRayN_id(args->ray, args->N, k);
+    if (context.chances.of(ray, triangle) >= opacity[context.channel]) args->valid[k] = 0;
+  }
+}
+
+/// Takes from a segment what a point of it stops; ends it where nothing is left.
+void Tree::weaken(const RTCFilterFunctionNArguments* args) {
+  const auto& context = *reinterpret_cast<const PacketContext*>(args->context);
+  for (unsigned k = 0; k < args->N; ++k) {
+    if (args->valid[k] != -1) continue;
+    const std::uint32_t triangle = context.tree->triangle(kSeeThrough, RTCHitN_primID(args->hit, args->N, k));
+    const Vec3 opacity =
+        context.tree->opacity_->opacity(triangle, RTCHitN_u(args->hit, args->N, k), RTCHitN_v(args->hit, args->N, k));
+    if (context.transmitted == nullptr) {
+      if (max_component(opacity) <= 0) args->valid[k] = 0;
+      continue;
+    }
+    Vec3& left = context.transmitted[RTCRayN_id(args->ray, args->N, k)];
+    left = scaled_by(left, Vec3{1, 1, 1} - opacity);
+    if (max_component(left) > 0) args->valid[k] = 0;
+  }
+}
+
+class EmbreeVisibility final : public Visibility {
+ public:
+  EmbreeVisibility(std::shared_ptr<const Tree> tree, int channel) : tree_(std::move(tree)), channel_(channel) {
+    if (!tree_->is_see_through() || channel > 0) return;
+    for (int c = 1; c < 3; ++c) others_[c - 1] = std::make_unique<EmbreeVisibility>(tree_, c);
+  }
+
+  bool is_see_through() const override { return tree_->is_see_through(); }
+  const Visibility& channel(int c) const override { return c == 0 || !others_[c - 1] ? *this : *others_[c - 1]; }
 
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const override {
     RADBAKE_CHECK_EQ(rays.size(), hits.size());
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    PacketContext context = make_context(rays, nullptr);
     alignas(64) int valid[kPacket];
     RTCRayHit16 packet;
     set_constants(packet.ray);
     for (std::size_t first = 0; first < rays.size(); first += kPacket) {
+      context.first = first;
       const int count = static_cast<int>(std::min<std::size_t>(kPacket, rays.size() - first));
       for (int k = 0; k < kPacket; ++k) {
         valid[k] = k < count ? -1 : 0;
@@ -100,57 +191,59 @@ class EmbreeVisibility final : public Visibility {
         packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
         packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
       }
-      rtcIntersect16(valid, scene_, &context, &packet);
+      rtcIntersect16(valid, tree_->scene(), &context.base, &packet);
       for (int k = 0; k < count; ++k) {
-        const bool is_hit = packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
-        hits[first + k] = is_hit ? Hit{packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k]} : Hit{};
+        const unsigned geometry = packet.hit.geomID[k];
+        hits[first + k] = geometry != RTC_INVALID_GEOMETRY_ID
+                              ? Hit{tree_->triangle(geometry, packet.hit.primID[k]), packet.hit.u[k], packet.hit.v[k],
+                                    packet.ray.tfar[k]}
+                              : Hit{};
       }
     }
   }
 
   void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const override {
     RADBAKE_CHECK_EQ(segments.size(), blocked.size());
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    alignas(64) int valid[kPacket];
-    RTCRay16 packet;
-    set_constants(packet);
-    for (std::size_t first = 0; first < segments.size(); first += kPacket) {
-      const int count = static_cast<int>(std::min<std::size_t>(kPacket, segments.size() - first));
-      for (int k = 0; k < kPacket; ++k) {
-        valid[k] = k < count ? -1 : 0;
-        set_lane(packet, k, segments[first + std::min(k, count - 1)]);
-      }
-      rtcOccluded16(valid, scene_, &context, &packet);
-      for (int k = 0; k < count; ++k) blocked[first + k] = packet.tfar[k] < 0;
-    }
+    occlude(segments, nullptr, [&](std::size_t at, bool is_ended, Vec3) { blocked[at] = is_ended; });
+  }
+
+  void transmitted(std::span<const Ray> segments, std::span<Vec3> shares) const override {
+    RADBAKE_CHECK_EQ(segments.size(), shares.size());
+    std::array<Vec3, kPacket> left;
+    occlude(segments, left.data(),
+            [&](std::size_t at, bool is_ended, Vec3 share) { shares[at] = is_ended ? Vec3{} : share; });
   }
 
   void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const override {
     triangles.clear();
     const auto collect = [](RTCPointQueryFunctionArguments* found) {
-      static_cast<std::vector<std::uint32_t>*>(found->userPtr)->push_back(found->primID);
+      const Near& near = *static_cast<const Near*>(found->userPtr);
+      near.triangles.push_back(near.tree.triangle(found->geomID, found->primID));
       return false;  // the radius stays as it is
     };
-    query_sphere(point, distance, collect, &triangles);
+    Near near{*tree_, triangles};
+    query_sphere(point, distance, collect, &near);
     std::sort(triangles.begin(), triangles.end());
   }
 
   void triangles_in(const Shaft& shaft, std::vector<std::uint32_t>& triangles) const override {
     RADBAKE_CHECK_LT(0.0, shaft.radius);
     triangles.clear();
-    Search search{shaft, vertices_, triangles};
+    Search search{shaft, *tree_, triangles};
     const auto collect = [](RTCPointQueryFunctionArguments* found) {
       const Search& search = *static_cast<const Search*>(found->userPtr);
+      const float* numbers = search.tree.corners(found->geomID, found->primID);
       Corners corners;
       double size = 0;
       for (int corner = 0; corner < 3; ++corner) {
         for (int axis = 0; axis < 3; ++axis) {
-          corners[corner][axis] = search.vertices[9 * std::size_t{found->primID} + 3 * corner + axis];
+          corners[corner][axis] = numbers[3 * corner + axis];
           size = std::max(size, std::fabs(corners[corner][axis]));
         }
       }
-      if (search.shaft.may_hold(corners, kRounding * (1 + size))) search.triangles.push_back(found->primID);
+      if (search.shaft.may_hold(corners, kRounding * (1 + size))) {
+        search.triangles.push_back(search.tree.triangle(found->geomID, found->primID));
+      }
       return false;
     };
     // Cover the shaft with spheres along its axis, about as long as they are wide.
@@ -172,17 +265,46 @@ class EmbreeVisibility final : public Visibility {
   }
 
   std::string instruction_set() const override {
-    if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return "avx512";
-    if (rtcGetDeviceProperty(device_, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) return "avx";
+    if (rtcGetDeviceProperty(tree_->device(), RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return "avx512";
+    if (rtcGetDeviceProperty(tree_->device(), RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0) return "avx";
     return "sse";
   }
 
  private:
-  struct Search {
-    const Shaft& shaft;
-    const float* vertices;
+  struct Near {
+    const Tree& tree;
     std::vector<std::uint32_t>& triangles;
   };
+  struct Search {
+    const Shaft& shaft;
+    const Tree& tree;
+    std::vector<std::uint32_t>& triangles;
+  };
+
+  PacketContext make_context(std::span<const Ray> batch, Vec3* transmitted) const {
+    PacketContext context{{}, tree_.get(), channel_, Chances(batch), 0, transmitted};
+    rtcInitIntersectContext(&context.base);
+    return context;
+  }
+
+  /// Calls take(segment, whether it was ended, what is left of its light). Shapes: left [kPacket], or null.
+  template <typename Take>
+  void occlude(std::span<const Ray> segments, Vec3* left, const Take& take) const {
+    PacketContext context = make_context(segments, left);
+    alignas(64) int valid[kPacket];
+    RTCRay16 packet;
+    set_constants(packet);
+    for (std::size_t first = 0; first < segments.size(); first += kPacket) {
+      const int count = static_cast<int>(std::min<std::size_t>(kPacket, segments.size() - first));
+      for (int k = 0; k < kPacket; ++k) {
+        valid[k] = k < count ? -1 : 0;
+        set_lane(packet, k, segments[first + std::min(k, count - 1)]);
+      }
+      if (left != nullptr) std::fill_n(left, kPacket, Vec3{1, 1, 1});
+      rtcOccluded16(valid, tree_->scene(), &context.base, &packet);
+      for (int k = 0; k < count; ++k) take(first + k, packet.tfar[k] < 0, left != nullptr ? left[k] : Vec3{});
+    }
+  }
 
   void query_sphere(Vec3 centre, double radius, RTCPointQueryFunction collect, void* user) const {
     RTCPointQueryContext context;
@@ -192,21 +314,21 @@ class EmbreeVisibility final : public Visibility {
     query.y = static_cast<float>(centre.y);
     query.z = static_cast<float>(centre.z);
     query.radius = static_cast<float>(radius + kRounding * (1 + radius + length(centre)));
-    rtcPointQuery(scene_, &query, &context, collect, user);
+    rtcPointQuery(tree_->scene(), &query, &context, collect, user);
   }
 
-  const float* vertices_ = nullptr;  ///< [9 x triangles], of the geometry
-  RTCDevice device_ = nullptr;
-  RTCScene scene_ = nullptr;
-  bool is_built_ = false;
+  std::shared_ptr<const Tree> tree_;
+  int channel_;
+  std::array<std::unique_ptr<EmbreeVisibility>, 2> others_;  ///< channels 1 and 2, where they may differ
 };
 
 }  // namespace
 
-std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop) {
-  auto visibility = std::make_unique<EmbreeVisibility>(triangles, stop);
-  if (!visibility->is_built()) return nullptr;
-  return visibility;
+std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop,
+                                                   const Opacity* opacity) {
+  auto tree = std::make_shared<const Tree>(triangles, stop, opacity);
+  if (!tree->is_built()) return nullptr;
+  return std::make_unique<EmbreeVisibility>(std::move(tree), 0);
 }
 
 }  // namespace radbake::radiosity

@@ -28,6 +28,18 @@ struct Hit {
   std::uint32_t triangle = kNoHit;
   float u = 0;
   float v = 0;
+  float distance = std::numeric_limits<float>::infinity();  ///< in lengths of the ray's direction
+};
+
+/// How much of a surface stands in the way of light, where that is not all of it: holes, partial coverage, tinted
+/// sheets. Thread-safe.
+class Opacity {
+ public:
+  virtual ~Opacity() = default;
+  /// Whether light passes any part of a triangle: the others are never asked for their opacity.
+  virtual bool is_see_through(std::uint32_t triangle) const = 0;
+  /// Share of the light that a point stops, by channel, 0..1. (u, v): weights of the second and third corner.
+  virtual Vec3 opacity(std::uint32_t triangle, double u, double v) const = 0;
 };
 
 /// A convex region: within a distance of a segment, and inside all of some half-spaces.
@@ -56,10 +68,23 @@ class Visibility {
   virtual ~Visibility() = default;
 
   /// Nearest hit of each ray, from either side. Shapes: rays [n], hits [n].
+  ///
+  /// Of what is see-through, a ray is stopped with the probability of its opacity in this channel, as Chances says: the
+  /// shares of the rays of a batch are right, and channels of equal opacity agree.
   virtual void trace(std::span<const Ray> rays, std::span<Hit> hits) const = 0;
 
-  /// Whether anything lies on each segment. Shapes: segments [n], blocked [n], 0 or 1.
+  /// Whether anything lies on each segment, be it see-through in part. Shapes: segments [n], blocked [n], 0 or 1.
   virtual void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const = 0;
+
+  /// The share of light that each segment lets through, by channel: the product of 1 - opacity of all that it crosses.
+  /// Shapes: segments [n], shares [n].
+  virtual void transmitted(std::span<const Ray> segments, std::span<Vec3> shares) const = 0;
+
+  /// Whether `transmitted` may be anything but 0 and 1.
+  virtual bool is_see_through() const { return false; }
+
+  /// The same surfaces as another channel (0, 1, 2) meets them. Lives as long as this.
+  virtual const Visibility& channel(int) const { return *this; }
 
   /// Triangles that come within a distance of a point, ascending; a superset, never fewer.
   virtual void triangles_near(Vec3 point, double distance, std::vector<std::uint32_t>& triangles) const = 0;
@@ -75,10 +100,31 @@ class Visibility {
 using Corners = std::array<Vec3, 3>;
 
 /// Embree's tree over triangles, watertight at shared edges. Corners should lie within a few units of 0: they are
-/// stored in float. Null where `stop` was requested while the tree was built.
-std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop = {});
+/// stored in float. Null where `stop` was requested while the tree was built. `opacity` outlives it; null: all is
+/// opaque.
+std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop = {},
+                                                   const Opacity* opacity = nullptr);
 
 /// The slow twin for tests: every ray against every triangle, in double (Moeller & Trumbore 1997).
-std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles);
+std::unique_ptr<Visibility> make_brute_force_visibility(std::span<const Corners> triangles,
+                                                        const Opacity* opacity = nullptr);
+
+/// Answers as `visibility`, which outlives it, but nothing ever blocks a segment: for direct light and receivers in
+/// scenes where nothing can, or to see what shadows do.
+std::unique_ptr<Visibility> make_unblocked(const Visibility& visibility);
+
+/// The numbers in [0, 1) that decide which rays of a batch are stopped: those below the opacity.
+///
+/// Ray i meets triangle t at frac(a_t (i + 1/2) + shift(batch, t)) with a_t one of a few irrational numbers: the rays
+/// that meet a sheet are stopped in turn rather than by lot, and two sheets in different turns. Source: Weyl 1916
+/// (equidistribution); Cranley & Patterson 1976 (shifts).
+class Chances {
+ public:
+  explicit Chances(std::span<const Ray> batch);
+  double of(std::size_t ray, std::uint32_t triangle) const;
+
+ private:
+  std::uint64_t seed_ = 0;  ///< what the first ray of the batch is
+};
 
 }  // namespace radbake::radiosity

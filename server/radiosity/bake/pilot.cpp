@@ -1,0 +1,292 @@
+#include "server/radiosity/bake/pilot.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "server/radiosity/bake/bake_work.h"
+#include "server/radiosity/bake/cpu_clock.h"
+#include "server/radiosity/bake/radiosity_system.h"
+#include "server/radiosity/gather/receive.h"
+#include "server/radiosity/threads/for_each_range.h"
+
+namespace radbake::radiosity {
+namespace {
+
+/// Numbers that keep the pilot's seeds apart from those of the bake.
+enum Purpose : std::uint64_t { kSites = 91, kRays = 92, kLight = 93 };
+
+/// What one row or receiver took and had.
+struct Trial {
+  double seconds = 0, light_seconds = 0;
+  double rays = 0, light_rays = 0, entries = 0;
+  double passed_on = 0;  ///< reflectance times the share of the row that meets surfaces
+};
+
+/// The mean of something over trials, with those few left down that were interrupted.
+struct Mean {
+  double value = 0, error = 0;
+};
+Mean mean_of(const std::vector<Trial>& trials, const std::function<double(const Trial&)>& property) {
+  if (trials.empty()) return {};
+  std::vector<double> values;
+  for (const Trial& trial : trials) values.push_back(property(trial));
+  std::vector<double> sorted = values;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  constexpr double kInterrupted = 8;
+  const double limit = kInterrupted * sorted[sorted.size() / 2];
+  const auto n = static_cast<double>(values.size());
+  double sum = 0, squares = 0;
+  for (double& value : values) sum += value = limit > 0 ? std::min(value, limit) : value;
+  const double mean = sum / n;
+  for (const double value : values) squares += (value - mean) * (value - mean);
+  return {mean, n > 1 ? std::sqrt(squares / (n - 1) / n) : mean};
+}
+
+/// Item k of a pattern that is spread evenly over n at any length: multiples of the golden section.
+std::size_t spread_index(std::size_t k, std::size_t n) {
+  constexpr double kGolden = 0.61803398874989485;
+  const double place = std::fmod((static_cast<double>(k) + 0.5) * kGolden, 1.0);
+  return std::min(static_cast<std::size_t>(place * static_cast<double>(n)), n - 1);
+}
+
+/// Rows and receivers of a prepared scene, one at a time, as its bake makes them.
+class Pilot {
+ public:
+  explicit Pilot(const Preparation& prepared)
+      : prepared_(prepared),
+        surfaces_(prepared.surveyed.surfaces),
+        rows_(surfaces_, prepared.patches, *prepared.visibility, prepared.plan.rays_per_texel),
+        patch_light_(surfaces_, prepared.shadows(), kLightSamplesPerPatch),
+        texel_light_(surfaces_, prepared.shadows(), kLightSamplesPerTexel, Environment::Part::kBright),
+        // Light everywhere: none would take the path of what is sealed.
+        radiosity_(prepared.patches.size(), Vec3{1, 1, 1}),
+        site_points_(rows_.num_sites()) {
+    if (surfaces_.effects.has(Effect::kInterreflection)) {
+      row_estimator_ = make_row_estimator(prepared, 0);
+      sampler_.emplace(surfaces_, prepared.patches, *row_estimator_, patch_light_, prepared.options.seed);
+    }
+  }
+
+  std::size_t num_rows() const { return sampler_ ? prepared_.patches.num_cells() : 0; }
+  std::size_t num_receivers() const {
+    return prepared_.atlas ? static_cast<std::size_t>(prepared_.atlas->num_rows()) * prepared_.atlas->width()
+                           : prepared_.groups->size();
+  }
+
+  Trial try_row(std::size_t index, PatchScratch& scratch) const {
+    const auto patch = static_cast<std::uint32_t>(index);
+    FormFactorRow row;
+    const double start = thread_cpu_seconds();
+    sampler_->sample_row(patch, scratch, {}, row);
+    const double lit = thread_cpu_seconds();
+    const PatchSample sample = sampler_->sample_light(patch, scratch);
+    const double end = thread_cpu_seconds();
+    Trial trial{end - start,
+                end - lit,
+                static_cast<double>(row.traced),
+                static_cast<double>(sample.light_rays),
+                static_cast<double>(row.entries.size()),
+                0};
+    if (row.counted > 0) {
+      trial.passed_on = mean_component(sample.reflectance) * (1 - (row.escaped + row.absorbed) / row.counted);
+    }
+    return trial;
+  }
+
+  PatchScratch make_row_scratch() const { return sampler_->make_scratch(); }
+
+  /// Empty: the texel covers nothing.
+  std::optional<Trial> try_receiver(std::size_t index, Footprint& footprint, ReceiveScratch& scratch) const {
+    const GatherScene scene{surfaces_,     prepared_.shadows(),   rows_, texel_light_, radiosity_, {},
+                            surfaces_.sky, prepared_.options.seed};
+    const double start = thread_cpu_seconds();
+    if (!place_sites(index, footprint, scratch)) return std::nullopt;
+    const Reception reception = receive(scene, seed_of(prepared_.options.seed, kRays, index),
+                                        seed_of(prepared_.options.seed, kLight, index), scratch);
+    return Trial{thread_cpu_seconds() - start, 0, static_cast<double>(reception.rays),
+                 static_cast<double>(reception.light_rays)};
+  }
+
+ private:
+  bool place_sites(std::size_t index, Footprint& footprint, ReceiveScratch& scratch) const {
+    const auto seeds = SobolPoints::seeds_of(seed_of(prepared_.options.seed, kSites, index));
+    scratch.sites.clear();
+    if (prepared_.atlas) {
+      const auto width = static_cast<std::size_t>(prepared_.atlas->width());
+      prepared_.atlas->footprint(static_cast<int>(index % width), static_cast<int>(index / width), footprint);
+      if (footprint.is_empty()) return false;
+    }
+    for (int s = 0; s < site_points_.size(); ++s) {
+      double u = site_points_.coordinate(s, 0, seeds), v = site_points_.coordinate(s, 1, seeds);
+      SurfacePoint p;
+      if (prepared_.atlas) {
+        p = footprint.sample(u, v);
+      } else {
+        // Somewhere on the first triangle of the vertex: rays cost the same there.
+        if (u + v > 1) u = 1 - u, v = 1 - v;
+        p = {prepared_.groups->corners[prepared_.groups->first_corner[index]] / 3, u, v};
+      }
+      scratch.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+    }
+    return true;
+  }
+
+  const Preparation& prepared_;
+  const Surfaces& surfaces_;
+  HemisphereEstimator rows_;
+  DirectLight patch_light_, texel_light_;
+  std::vector<Vec3> radiosity_;
+  SobolPoints site_points_;
+  std::unique_ptr<RowEstimator> row_estimator_;
+  std::optional<PatchSampler> sampler_;
+};
+
+/// What the trials so far tell.
+struct Sounding {
+  std::vector<Trial> rows, receivers;
+  double seconds = 0;
+
+  HostCosts costs(const HostCosts& known) const {
+    HostCosts found = known;
+    const auto value = [](const std::vector<Trial>& trials, double Trial::*property) {
+      return mean_of(trials, [=](const Trial& trial) { return trial.*property; }).value;
+    };
+    const double light_rays = value(rows, &Trial::light_rays);
+    if (light_rays > 0) found.light_ray = value(rows, &Trial::light_seconds) / light_rays;
+    const double row_rays = value(rows, &Trial::rays), row_seconds = value(rows, &Trial::seconds);
+    // What was not told apart goes to the rays, or where there are none to the row.
+    const double beside = std::max(0.0, row_seconds - light_rays * found.light_ray);
+    found.row = row_rays > 0 ? 0 : beside;
+    if (row_rays > 0) found.row_ray = beside / row_rays;
+    const double rays = value(receivers, &Trial::rays), shadow_rays = value(receivers, &Trial::light_rays);
+    const double seconds = value(receivers, &Trial::seconds);
+    found.receiver = 0;
+    // A receiver's shadow rays cost no more than a patch's; at least a tenth of its time goes to its other rays.
+    constexpr double kLeast = 0.1;
+    if (shadow_rays > 0) found.light_ray = std::min(found.light_ray, (1 - kLeast) * seconds / shadow_rays);
+    if (rays > 0) found.texel_ray = (seconds - shadow_rays * found.light_ray) / rays;
+    return found;
+  }
+  CostSpread spread() const {
+    const auto relative = [](const std::vector<Trial>& trials) {
+      const Mean mean = mean_of(trials, [](const Trial& trial) { return trial.seconds; });
+      return mean.value > 0 ? mean.error / mean.value : 0;
+    };
+    return {relative(rows), relative(receivers)};
+  }
+  /// What the work leaves open until it is tried.
+  void complete(BakeWork& work) const {
+    const auto mean = [](const std::vector<Trial>& trials, double Trial::*property) {
+      return mean_of(trials, [=](const Trial& trial) { return trial.*property; }).value;
+    };
+    if (!rows.empty()) {
+      work.rays_per_row = mean(rows, &Trial::rays);
+      work.light_rays_per_row = mean(rows, &Trial::light_rays);
+      work.entries_per_row = mean(rows, &Trial::entries);
+      work.sweeps = expected_sweeps(mean(rows, &Trial::passed_on), SolveOptions{}.relative_tolerance);
+    }
+    if (!receivers.empty()) {
+      work.rays_per_receiver = mean(receivers, &Trial::rays);
+      work.light_rays_per_receiver = mean(receivers, &Trial::light_rays);
+    }
+  }
+};
+
+/// Tries rows and receivers in growing rounds, on all threads, until they have taken their share of what they predict.
+Sounding sound(const Preparation& prepared, const BakeWork& counted, const HostCosts& known,
+               const std::stop_token& stop) {
+  constexpr std::size_t kFirst = 4, kMost = 4096;
+  constexpr double kExact = 0.02;  // standard error over mean: more trials would tell no more than the model
+  const double start = process_cpu_seconds();
+  const Pilot pilot(prepared);
+  Sounding sounding;
+  std::size_t next_row = 0, next_receiver = 0;
+  for (std::size_t size = kFirst; size <= kMost && !stop.stop_requested(); size *= 2) {
+    std::vector<Trial> rows(pilot.num_rows() > 0 ? std::min(size, pilot.num_rows()) : 0);
+    std::vector<std::optional<Trial>> receivers(std::min(2 * size, pilot.num_receivers()));
+    for_each_range(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
+      PatchScratch scratch = pilot.make_row_scratch();
+      for (std::size_t k = begin; k < end && !stop.stop_requested(); ++k) {
+        rows[k] = pilot.try_row(spread_index(next_row + k, pilot.num_rows()), scratch);
+      }
+    });
+    for_each_range(receivers.size(), 2, [&](std::size_t begin, std::size_t end) {
+      Footprint footprint;
+      ReceiveScratch scratch;
+      for (std::size_t k = begin; k < end && !stop.stop_requested(); ++k) {
+        receivers[k] = pilot.try_receiver(spread_index(next_receiver + k, pilot.num_receivers()), footprint, scratch);
+      }
+    });
+    next_row += rows.size();
+    next_receiver += receivers.size();
+    // The first round finds nothing in the caches: it counts only until there is another.
+    if (size == 2 * kFirst) sounding.rows.clear(), sounding.receivers.clear();
+    sounding.rows.insert(sounding.rows.end(), rows.begin(), rows.end());
+    for (const std::optional<Trial>& trial : receivers) {
+      if (trial) sounding.receivers.push_back(*trial);
+    }
+    sounding.seconds = process_cpu_seconds() - start;
+
+    // Another round takes about twice of what this one took.
+    BakeWork work = counted;
+    sounding.complete(work);
+    const double whole = total_of(predict_stages(work, sounding.costs(known), {})).cpu_seconds;
+    const CostSpread spread = sounding.spread();
+    const bool is_exact = sounding.receivers.size() > kFirst && spread.row < kExact && spread.receiver < kExact;
+    if (is_exact || 3 * sounding.seconds > std::min(kPilotSeconds, kPilotShare * whole)) break;
+  }
+  return sounding;
+}
+
+}  // namespace
+
+Prediction predict_bake(const Preparation& prepared, double preparing_seconds, const std::stop_token& stop) {
+  BakeWork work = count_work(prepared, preparing_seconds);
+  const HostCosts known = or_usual(prepared.options.costs);
+  CostSpread spread;
+  Prediction prediction;
+  prediction.source = "stored";
+  HostCosts costs = known;
+  const bool has_stored = prepared.options.costs.texel_ray > 0;
+  if (!has_stored || total_of(predict_stages(work, known, spread)).cpu_seconds >= kNoPilotSeconds) {
+    const Sounding sounding = sound(prepared, work, known, stop);
+    sounding.complete(work);
+    costs = sounding.costs(known);
+    spread = sounding.spread();
+    prediction.source = "pilot";
+    prediction.pilot_seconds = sounding.seconds;
+  }
+  work.preparing_seconds += prediction.pilot_seconds;
+  prediction.stages = predict_stages(work, costs, spread);
+  prediction.total = total_of(prediction.stages);
+  prediction.costliest = costliest_meshes(prepared, work, costs);
+  prediction.effects = seconds_by_effect(prepared, work, costs);
+  return prediction;
+}
+
+HostCosts measured_costs(const BakeReport& report) {
+  HostCosts costs;
+  const auto seconds_of = [&](const char* name) {
+    for (const StageTime& stage : report.stages) {
+      if (stage.stage == name) return stage.cpu_seconds;
+    }
+    return 0.0;
+  };
+  // Shadow rays go with the stage that traced them: a ray is a ray.
+  const double rows = seconds_of("form_factors"), texels = seconds_of("gathering"), solve = seconds_of("solving");
+  if (report.num_row_rays > 0) costs.row_ray = rows / static_cast<double>(report.num_row_rays);
+  if (report.num_gather_rays > 0) {
+    const auto all = static_cast<double>(report.num_gather_rays + report.num_light_rays);
+    costs.texel_ray = costs.light_ray = texels / all;
+  }
+  const double steps = report.solver.sweeps * static_cast<double>(report.transport.num_entries);
+  if (steps > 0 && report.plan.transport != Transport::kStreamed) {
+    const int channels = report.plan.num_channels;
+    costs.entry_step = solve / steps / (channels > 1 ? 1 : kOneChannelShare);
+  }
+  return costs;
+}
+
+}  // namespace radbake::radiosity

@@ -138,6 +138,32 @@ TEST(SeeThrough, AFurnaceStaysOneWithAMaskedSheetInIt) { expect_furnace(furnace_
 TEST(SeeThrough, AFurnaceStaysOneWithATintedSheetInIt) { expect_furnace(furnace_with_sheet({0.7, 0.4, 0.1}, false)); }
 TEST(SeeThrough, AFurnaceStaysOneWithAClearSheetInIt) { expect_furnace(furnace_with_sheet({0.6, 0.6, 0.6}, false)); }
 
+// A panel full of holes sends half of what it would without: the balance of a closed room holds within 3 standard
+// errors.
+TEST(SeeThrough, AMaskedEmitterKeepsTheEnergyOfARoom) {
+  RoomBuilder builder(4);
+  builder.add_box("room", {0, 0, 0}, {4, 3, 5}, builder.add_material("grey", {0.5, 0.5, 0.5}), true);
+  const int lamp = builder.add_material("lamp", {0.5, 0.5, 0.5}, {1000, 1000, 1000}, true);
+  builder.add_quad("panel", {2, 2, 2}, {0.5, 0, 0}, {0, 0, 0.5}, lamp);
+  punch_holes(builder.scene());
+  const auto energy = baked(builder.scene(), {.atlas_size = 64, .rays = 256}).report.energy;
+  EXPECT_TRUE(energy.is_closed);
+  EXPECT_NEAR(energy.emitted / (2 * 0.25 * 0.5 * 1000), 1, 0.05);
+  EXPECT_LE(std::fabs(energy.gap), 3 * energy.gap_standard_error);
+  EXPECT_LT(energy.gap_standard_error, 0.02 * energy.emitted);
+}
+
+TEST(SeeThrough, IsRefusedByFormFactorsByFormula) {
+  BlackRoom room(true);
+  room.add_sheet().transmittance = {0.5, 0.5, 0.5};
+  const Scene scene = room.builder.scene();
+  BakeOptions options = kOptions;
+  options.form_factors = radiosity::FormFactors::kAnalytic;
+  const auto planned = radiosity::plan_scene(scene, options);
+  ASSERT_FALSE(planned.ok());
+  EXPECT_NE(planned.error().message.find("--form-factors analytic"), std::string::npos) << planned.error().message;
+}
+
 // All light is direct and indirect light: layer by layer, and their sum to single precision.
 TEST(Layers, DirectAndIndirectAddUpToAllLight) {
   BakeOptions options{.atlas_size = 128, .rays = 64};

@@ -274,17 +274,26 @@ HostCosts measured_costs(const BakeReport& report) {
     }
     return 0.0;
   };
-  // Shadow rays go with the stage that traced them: a ray is a ray.
   const double rows = seconds_of("form_factors"), texels = seconds_of("gathering"), solve = seconds_of("solving");
-  if (report.num_row_rays > 0) costs.row_ray = rows / static_cast<double>(report.num_row_rays);
-  if (report.num_gather_rays > 0) {
-    const auto all = static_cast<double>(report.num_gather_rays + report.num_light_rays);
-    costs.texel_ray = costs.light_ray = texels / all;
+  const auto num_row_rays = static_cast<double>(report.num_row_rays);
+  const auto num_texel_rays = static_cast<double>(report.num_gather_rays);
+
+  // Share the shadow rays out as they were asked for; in the gather a ray is a ray.
+  const BakePlan& plan = report.plan;
+  const double of_rows = num_row_rays > 0 ? static_cast<double>(plan.num_patches) * kLightSamplesPerPatch : 0;
+  const double of_texels = static_cast<double>(plan.num_texels + plan.num_vertex_groups) * kLightSamplesPerTexel;
+  const double num_light_rays = static_cast<double>(report.num_light_rays) / std::max(of_rows + of_texels, 1.0);
+  if (num_texel_rays > 0) {
+    costs.texel_ray = costs.light_ray = texels / (num_texel_rays + num_light_rays * of_texels);
+  }
+  if (num_row_rays > 0) {
+    const double beside = num_light_rays * of_rows * costs.light_ray +
+                          static_cast<double>(report.transport.num_entries) / 2 * kUsualCosts.entry;
+    costs.row_ray = std::max(rows - beside, rows / 4) / num_row_rays;
   }
   const double steps = report.solver.sweeps * static_cast<double>(report.transport.num_entries);
-  if (steps > 0 && report.plan.transport != Transport::kStreamed) {
-    const int channels = report.plan.num_channels;
-    costs.entry_step = solve / steps / (channels > 1 ? 1 : kOneChannelShare);
+  if (steps > 0 && plan.transport != Transport::kStreamed) {
+    costs.entry_step = solve / steps / (plan.num_channels > 1 ? 1 : kOneChannelShare);
   }
   return costs;
 }

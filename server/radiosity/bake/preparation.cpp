@@ -88,6 +88,13 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.light_samples_per_texel =
       std::count(surfaces.is_emitter.begin(), surfaces.is_emitter.end(), 1) > 0 ? kLightSamplesPerTexel : 0;
   choose_methods(options, plan);
+  if (prepared->opacity &&
+      (plan.form_factors == FormFactors::kAnalytic || plan.form_factors == FormFactors::kAdaptive)) {
+    return invalid_argument(std::string("form factors by formula (--form-factors ") +
+                            form_factors_name(plan.form_factors) +
+                            ") know opaque surfaces only, and light passes some of this scene's: choose hemisphere or "
+                            "hemicube, or force alpha_mask and tint off (--effect)");
+  }
   plan.texels_per_meter = reached_density;
   plan.warnings.insert(plan.warnings.begin(), prepared->surveyed.warnings.begin(), prepared->surveyed.warnings.end());
   plan.warnings.insert(plan.warnings.end(), layout_warnings.begin(), layout_warnings.end());

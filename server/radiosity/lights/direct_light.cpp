@@ -56,12 +56,27 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
   }
 }
 
+Vec3 DirectLight::sent_by(std::uint32_t triangle) const {
+  if (!surfaces_.is_see_through(triangle)) return surfaces_.exitances[triangle];
+  // Of what is see-through, only the opaque part sends.
+  constexpr int kPoints = 4096;  // holes are finer than what reflects
+  static const SobolPoints points(kPoints);
+  const auto seeds = SobolPoints::seeds_of(triangle);
+  Vec3 sum;
+  for (int i = 0; i < kPoints; ++i) {
+    SurfacePoint p{triangle, points.coordinate(i, 0, seeds), points.coordinate(i, 1, seeds)};
+    if (p.u + p.v > 1) p.u = 1 - p.u, p.v = 1 - p.v;
+    sum += scaled_by(surfaces_.exitance(p), surfaces_.opacity(p));
+  }
+  return sum / kPoints;
+}
+
 double DirectLight::emitted_lumens() const {
   const double square_metres = surfaces_.metres_per_unit * surfaces_.metres_per_unit;
   double lumens = 0;
   for (const Emitter& emitter : emitters_) {
-    lumens += surfaces_.areas[emitter.triangle] * mean_component(surfaces_.exitances[emitter.triangle]) *
-              square_metres * (surfaces_.material(emitter.triangle).is_double_sided ? 2 : 1);
+    const int sides = surfaces_.material(emitter.triangle).is_double_sided ? 2 : 1;
+    lumens += surfaces_.areas[emitter.triangle] * mean_component(sent_by(emitter.triangle)) * square_metres * sides;
   }
   for (const Light& light : surfaces_.lights) {
     if (const auto* point = std::get_if<PointLight>(&light.kind)) {

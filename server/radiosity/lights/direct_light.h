@@ -64,6 +64,8 @@ class DirectLight {
     double power;  ///< area times exitance, largest of the channels
   };
 
+  /// Mean exitance of an emitter with its holes.
+  Vec3 sent_by(std::uint32_t triangle) const;
   void sample_emitters(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
                        std::size_t num_replicates) const;
   void sample_lamps(const std::vector<const Site*>& sites, Scratch& scratch, std::size_t num_replicates) const;

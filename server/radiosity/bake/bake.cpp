@@ -43,6 +43,7 @@ class Bake {
   Bake(const Scene& scene, const Preparation& prepared, ProgressMeter& progress, std::stop_token stop)
       : scene_(scene),
         options_(prepared.options),
+        num_ray_channels_(prepared.num_ray_channels()),
         prepared_(prepared),
         surfaces_(prepared.surveyed.surfaces),
         progress_(progress),
@@ -54,18 +55,17 @@ class Bake {
     outcome_.report.num_patches = prepared_.patches.size();
 
     outcome_.report.instruction_set = prepared_.visibility->instruction_set();
-    const int num_channels = prepared_.num_ray_channels();
-    std::vector<Vec3> radiosity, glow;
+    const int num_channels = num_ray_channels_;
+    RADBAKE_ASSIGN_OR_RETURN(auto systems, make_systems());
+    std::vector<Vec3> radiosity(prepared_.patches.size()), glow(radiosity);
     for (int channel = 0; channel < num_channels; ++channel) {
-      RADBAKE_ASSIGN_OR_RETURN(const Solution own, solve_channel(channel));
-      if (channel == 0) {
-        radiosity = own.radiosity;
-        glow = own.glow;
-        continue;
-      }
+      const auto system = std::move(systems[static_cast<std::size_t>(channel)]);
+      RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> own, radiosity_of(*system));
       for (std::size_t i = 0; i < radiosity.size(); ++i) {
-        radiosity[i][channel] = own.radiosity[i][channel];
-        glow[i][channel] = own.glow[i][channel];
+        for (int c = channel; c < (num_channels == 1 ? 3 : channel + 1); ++c) {
+          radiosity[i][c] = own[i][c];
+          glow[i][c] = system->glow[i][c];
+        }
       }
     }
     if (!options_.wants_direct && !options_.wants_indirect) glow = {};
@@ -87,28 +87,34 @@ class Bake {
   }
 
  private:
-  /// Shapes: [patches], lx.
-  struct Solution {
-    std::vector<Vec3> radiosity, glow;
-  };
-
-  /// Rows and solve, of what is see-through as one channel meets it. The report shows the last channel.
-  Result<Solution> solve_channel(int channel) {
-    const auto on_row = [this](std::uint64_t done, std::uint64_t total) {
-      progress_.report(BakeStage::kFormFactors, done, total);
-    };
-    RADBAKE_ASSIGN_OR_RETURN(const auto system,
-                             make_radiosity_system(prepared_, options_.seed, channel, on_row, stop_));
-    if (prepared_.num_ray_channels() > 1) keep_channel(channel, *system);
-    Solution solution{{}, system->glow};
-    if (system->transport) {
-      RADBAKE_ASSIGN_OR_RETURN(solution.radiosity, solve(*system));
-    } else {
-      solution.radiosity = solution.glow;
-      outcome_.report.solver.solver = "none";
-      outcome_.report.solver.status = "converged";
+  /// The rows of each channel that see-through surfaces tell apart.
+  Result<std::vector<std::unique_ptr<RadiositySystem>>> make_systems() {
+    BakeReport& report = outcome_.report;
+    std::vector<std::unique_ptr<RadiositySystem>> systems;
+    for (int channel = 0; channel < num_ray_channels_; ++channel) {
+      const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
+        const auto before = total * static_cast<std::uint64_t>(channel);
+        progress_.report(BakeStage::kFormFactors, before + done, total * static_cast<std::uint64_t>(num_ray_channels_));
+      };
+      RADBAKE_ASSIGN_OR_RETURN(auto system, make_radiosity_system(prepared_, options_.seed, channel, on_row, stop_));
+      if (num_ray_channels_ > 1) keep_channel(channel, *system);
+      report.num_row_rays += system->num_row_rays;
+      report.num_light_rays += system->num_light_rays;
+      systems.push_back(std::move(system));
     }
-    return solution;
+    // Of several channels, the report shows the first.
+    report.transport = systems.front()->summary;
+    const std::vector<Warning>& warnings = systems.front()->warnings;
+    report.warnings.insert(report.warnings.end(), warnings.begin(), warnings.end());
+    return systems;
+  }
+
+  /// What the patches send. Shapes: [patches], lx.
+  Result<std::vector<Vec3>> radiosity_of(const RadiositySystem& system) {
+    if (system.transport) return solve(system);
+    outcome_.report.solver.solver = "none";
+    outcome_.report.solver.status = "converged";
+    return system.glow;
   }
 
   /// The system of a channel: the other two become copies of it.
@@ -122,11 +128,6 @@ class Bake {
   Result<std::vector<Vec3>> solve(const RadiositySystem& system) {
     BakeReport& report = outcome_.report;
     progress_.report(BakeStage::kSolving, 0, 0);
-    report.num_row_rays += system.num_row_rays;
-    report.num_light_rays += system.num_light_rays;
-    report.transport = system.summary;
-    report.warnings.insert(report.warnings.end(), system.warnings.begin(), system.warnings.end());
-
     SolveOptions options;
     options.max_sweeps = max_sweeps_of(report.plan.survey.max_reflectance, options.relative_tolerance);
     options.max_lu_patches = std::numeric_limits<std::size_t>::max();  // never chosen but by name
@@ -136,7 +137,7 @@ class Bake {
                        view.step.relative_error_bound);
     };
     // Where all is grey, and where each channel has rows of its own, one stands for three.
-    const bool is_grey = report.plan.num_channels == 1 || prepared_.num_ray_channels() > 1;
+    const bool is_grey = report.plan.num_channels == 1 || num_ray_channels_ > 1;
     const Solver solver = report.plan.solver;
     RADBAKE_ASSIGN_OR_RETURN(
         const SolveReport solved,
@@ -162,7 +163,7 @@ class Bake {
     terms.light_flux = system.emitted_lumens;
     // Of a channel by itself the flux of the lights is not known.
     terms.is_closed =
-        report.transport.escape_share == 0 && report.transport.absorbed_share == 0 && prepared_.num_ray_channels() == 1;
+        report.transport.escape_share == 0 && report.transport.absorbed_share == 0 && num_ray_channels_ == 1;
     const EnergyBalance balance = audit_energy(*system.transport, terms);
     report.energy = {balance.is_closed,
                      balance.emitted,
@@ -285,6 +286,7 @@ class Bake {
 
   const Scene& scene_;
   const BakeOptions& options_;
+  const int num_ray_channels_;
   const Preparation& prepared_;
   const Surfaces& surfaces_;
   ProgressMeter& progress_;

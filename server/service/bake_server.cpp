@@ -52,7 +52,9 @@ Result<std::unique_ptr<BakeServer>> BakeServer::start(BakeServerOptions options)
 
   server->queue_ = std::make_unique<jobs::JobQueue>(options.queue, *server->jobs_, *server->content_);
   server->pool_ = std::make_unique<store::TaskPool>(kPoolThreads);
-  server->workers_service_ = std::make_unique<WorkersService>(*server->queue_, *server->pool_, options.limits);
+  server->costs_ = std::make_unique<CostFile>(options.costs.empty() ? options.data / "costs.txt" : options.costs);
+  server->workers_service_ =
+      std::make_unique<WorkersService>(*server->queue_, *server->pool_, *server->costs_, options.limits);
   server->content_service_ = std::make_unique<ContentService>(*server->content_, *server->pool_, options.limits);
   server->bakes_service_ = std::make_unique<BakesService>(*server->queue_, *server->content_, *server->pool_,
                                                           options.limits, options.max_threads);

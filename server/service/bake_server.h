@@ -22,6 +22,7 @@ namespace radbake::service {
 struct BakeServerOptions {
   std::string listen = "127.0.0.1:7419";  ///< host:port (0: any) or unix:PATH
   std::filesystem::path data;             ///< everything that must survive lives here; one server at a time
+  std::filesystem::path costs;            ///< what bakes cost on this host; empty: in the data folder
   jobs::QueueOptions queue;               ///< its max_* and spool folder are set from here
   Limits limits;
   std::uint32_t max_threads = 0;  ///< of a bake; 0: no bound
@@ -51,6 +52,7 @@ class BakeServer {
   std::unique_ptr<store::JobStore> jobs_;
   std::unique_ptr<jobs::JobQueue> queue_;
   std::unique_ptr<store::TaskPool> pool_;
+  std::unique_ptr<CostFile> costs_;
   std::unique_ptr<WorkersService> workers_service_;
   std::unique_ptr<ContentService> content_service_;
   std::unique_ptr<BakesService> bakes_service_;

@@ -37,10 +37,38 @@ grpc::ServerUnaryReactor* BakesService::run_on_pool(grpc::CallbackServerContext*
 
 grpc::ServerUnaryReactor* BakesService::SubmitBake(grpc::CallbackServerContext* context,
                                                    const v1::SubmitBakeRequest* request, v1::Bake* bake) {
+  if (request->validate_only()) return validate(context, *request, *bake);
   return run_on_pool(context, [this, request, bake] { return submit(*request, *bake); });
 }
 
 grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, v1::Bake& bake) {
+  store::NewJob job;
+  std::shared_ptr<jobs::Job> known;
+  if (auto status = admit(request, job, known); !status.ok()) return status;
+  return known ? reply(known, bake) : reply(queue_.submit(job), bake);
+}
+
+grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* context,
+                                                 const v1::SubmitBakeRequest& request, v1::Bake& bake) {
+  auto* reactor = new PlanReactor(queue_, bake.mutable_plan());
+  pool_.post([this, context, &request, &bake, reactor] {
+    store::NewJob job;
+    std::shared_ptr<jobs::Job> known;
+    grpc::Status status = check_protocol(*context);
+    if (status.ok()) status = admit(request, job, known);
+    if (status.ok()) {
+      bake.set_label(job.label);
+      bake.set_bake_key(job.bake_key);
+      *bake.mutable_manifest() = request.manifest();
+      *bake.mutable_settings() = request.settings();
+    }
+    reactor->begin(status, job.work);
+  });
+  return reactor;
+}
+
+grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::NewJob& job,
+                                 std::shared_ptr<jobs::Job>& known) {
   if (request.request_id().empty() || request.request_id().size() > kMaxRequestIdBytes) {
     return bad_field("request_id", "must have 1 to " + std::to_string(kMaxRequestIdBytes) + " bytes, not " +
                                        std::to_string(request.request_id().size()));
@@ -50,11 +78,12 @@ grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, v1::Bake
                      std::to_string(request.label().size()) + " bytes are above " + std::to_string(kMaxLabelBytes));
   }
   // A request that was accepted once is answered as it was, whatever became of its blobs and of the queue.
-  store::NewJob job;
   job.request_id = request.request_id();
   job.body_sha256 = digest_of(request.SerializeAsString()).sha256;
-  const auto known = queue_.find_request(job.request_id, job.body_sha256);
-  if (!known.ok() || *known) return reply(known, bake);
+  const auto found = queue_.find_request(job.request_id, job.body_sha256);
+  if (!found.ok()) return to_status(found.error());
+  known = *found;
+  if (known) return grpc::Status::OK;
 
   if (auto status = check_scene({request.manifest(), request.settings(), request.run()}, limits_, max_threads_,
                                 content_, job.work);
@@ -63,7 +92,7 @@ grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, v1::Bake
   }
   job.label = request.label();
   job.bake_key = make_bake_key(job.work);
-  return reply(queue_.submit(job), bake);
+  return grpc::Status::OK;
 }
 
 grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* context,

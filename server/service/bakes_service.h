@@ -31,6 +31,11 @@ class BakesService : public v1::Bakes::CallbackService {
 
  private:
   grpc::Status submit(const v1::SubmitBakeRequest& request, v1::Bake& bake);
+  /// Checks a submit as far as nothing is queued. known: the bake that the same request created before; then the rest
+  /// of the job is not filled in.
+  grpc::Status admit(const v1::SubmitBakeRequest& request, store::NewJob& job, std::shared_ptr<jobs::Job>& known);
+  grpc::ServerUnaryReactor* validate(grpc::CallbackServerContext* context, const v1::SubmitBakeRequest& request,
+                                     v1::Bake& bake);
   grpc::Status list(const v1::ListBakesRequest& request, v1::ListBakesResponse& response);
 
   /// Runs a call on the pool and finishes it with the status it returns.

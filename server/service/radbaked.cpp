@@ -51,6 +51,9 @@ void declare_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--data", server.data, "Folder for scenes, bakes and results")
       ->capture_default_str()
       ->type_name("DIR");
+  app.add_option("--costs", server.costs,
+                 "File for what bakes cost on this host, behind predictions; default: DIR/costs.txt")
+      ->type_name("FILE");
   app.add_option("--worker", server.queue.worker.program, "The radbake-worker to run")
       ->capture_default_str()
       ->type_name("PATH");

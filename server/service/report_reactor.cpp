@@ -34,8 +34,9 @@ class Link : public jobs::WorkerLink {
 
 }  // namespace
 
-ReportReactor* ReportReactor::start(jobs::JobQueue& queue, store::TaskPool& pool, const Limits& limits) {
-  const std::shared_ptr<ReportReactor> reactor(new ReportReactor(queue, pool, limits));
+ReportReactor* ReportReactor::start(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs,
+                                    const Limits& limits) {
+  const std::shared_ptr<ReportReactor> reactor(new ReportReactor(queue, pool, costs, limits));
   reactor->self_ = reactor;
   reactor->StartRead(&reactor->report_);
   return reactor.get();
@@ -77,6 +78,7 @@ grpc::Status ReportReactor::take_report() {
       break;
     }
     case v1::WorkerReport::kBakeFinished: {
+      costs_.add(report_.bake_finished().report().run().costs());
       std::vector<Digest> blobs;
       for (const v1::Layer& layer : report_.bake_finished().layers()) blobs.push_back(from_message(layer.blob()));
       if (report_.bake_finished().has_mesh_data()) blobs.push_back(from_message(report_.bake_finished().mesh_data()));
@@ -104,6 +106,7 @@ v1::WorkerCommand ReportReactor::start_command(const jobs::WorkOrder& order) con
   start.mutable_settings()->ParseFromString(order.work.settings);
   start.mutable_run()->ParseFromString(order.work.run);
   *start.mutable_limits() = limits_message<v1::Limits>(limits_);
+  *start.mutable_costs() = costs_.costs();
   for (const jobs::InputFile& file : order.inputs) {
     v1::InputBlob& input = *start.add_inputs();
     *input.mutable_digest() = to_message(file.digest);

@@ -8,6 +8,7 @@
 #include "radbake/v1/worker.grpc.pb.h"
 #include "server/jobs/job_queue.h"
 #include "server/jobs/worker_link.h"
+#include "server/service/cost_file.h"
 #include "server/store/task_pool.h"
 
 namespace radbake::service {
@@ -16,8 +17,8 @@ namespace radbake::service {
 /// can reach it.
 class WorkersService : public v1::Workers::CallbackService, public jobs::WorkerGate {
  public:
-  WorkersService(jobs::JobQueue& queue, store::TaskPool& pool, const Limits& limits)
-      : queue_(queue), pool_(pool), limits_(limits) {}
+  WorkersService(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, const Limits& limits)
+      : queue_(queue), pool_(pool), costs_(costs), limits_(limits) {}
 
   Result<void> start();
   void stop();
@@ -28,6 +29,7 @@ class WorkersService : public v1::Workers::CallbackService, public jobs::WorkerG
  private:
   jobs::JobQueue& queue_;
   store::TaskPool& pool_;
+  CostFile& costs_;
   const Limits limits_;
   std::unique_ptr<grpc::Server> server_;
 };

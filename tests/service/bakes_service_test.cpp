@@ -271,6 +271,55 @@ TEST_F(BakesServiceTest, PlansWithoutQueueingBehindBakes) {
   EXPECT_EQ(answer.num_patches(), static_cast<std::uint64_t>(kFakePatches));
 }
 
+TEST_F(BakesServiceTest, ValidatesASubmitWithAPlanAndQueuesNothing) {
+  v1::SubmitBakeRequest request = client_.request_for(client_.upload_scene(), kSucceed);
+  request.set_validate_only(true);
+  v1::Bake bake;
+  const grpc::Status status = submit(request, &bake);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(bake.name(), "");
+  EXPECT_EQ(bake.plan().num_patches(), static_cast<std::uint64_t>(kFakePatches));
+  EXPECT_EQ(bake.label(), "box.glb");
+  v1::ListBakesResponse page;
+  ASSERT_TRUE(client_.bakes->ListBakes(new_context().get(), {}, &page).ok());
+  EXPECT_EQ(page.bakes_size(), 0);
+
+  // The same id is still free, and the key is that of the bake.
+  request.set_validate_only(false);
+  v1::Bake submitted;
+  ASSERT_TRUE(submit(request, &submitted).ok());
+  EXPECT_EQ(submitted.bake_key(), bake.bake_key());
+  EXPECT_FALSE(submitted.has_plan());
+}
+
+TEST_F(BakesServiceTest, ValidatesAllThatASubmitIsRefusedFor) {
+  v1::SubmitBakeRequest request = client_.request_for(client_.upload_scene(), kSucceed);
+  request.set_validate_only(true);
+  request.mutable_settings()->set_rays(1'000'000);
+  EXPECT_EQ(refused_field(request), "settings.rays");
+  request = client_.request_for(client_.upload_scene(), kSucceed);
+  request.set_validate_only(true);
+  request.clear_request_id();
+  EXPECT_EQ(refused_field(request), "request_id");
+  request = client_.request_for(digest_message("not uploaded"), kSucceed);
+  request.set_validate_only(true);
+  EXPECT_EQ(submit(request).error_code(), grpc::FAILED_PRECONDITION);
+  request = client_.request_for(client_.upload_scene(), kFailBadScene);
+  request.set_validate_only(true);
+  v1::Bake bake;
+  EXPECT_THAT(submit(request, &bake).error_message(), HasSubstr("vertex 3"));
+}
+
+TEST_F(BakesServiceTest, TellsWorkersWhatTheLastBakesCost) {
+  v1::Plan answer;
+  ASSERT_TRUE(plan(kSucceed, &answer).ok());
+  EXPECT_EQ(answer.prediction().total().cpu_seconds(), 0);
+  client_.wait_for(client_.submit(kSucceed).name(), v1::SUCCEEDED);
+  ASSERT_TRUE(plan(kSucceed, &answer).ok());
+  EXPECT_EQ(answer.prediction().total().cpu_seconds(), kFakeRayCost);
+  EXPECT_TRUE(std::filesystem::exists(options_in(folder_.path()).data / "costs.txt"));
+}
+
 TEST_F(BakesServiceTest, TellsWhyAPlanFailed) {
   v1::Plan answer;
   const grpc::Status bad_scene = plan(kFailBadScene, &answer);

@@ -85,7 +85,10 @@ class FakeWorker {
   void succeed() {
     if (start_.plan_only()) {
       v1::WorkerReport report;
-      report.mutable_plan_finished()->set_num_patches(kFakePatches);
+      v1::Plan& plan = *report.mutable_plan_finished();
+      plan.set_num_patches(kFakePatches);
+      // Says what it was told of costs.
+      plan.mutable_prediction()->mutable_total()->set_cpu_seconds(start_.costs().row_ray());
       stream_.Write(report);
       return;
     }
@@ -158,6 +161,7 @@ class FakeWorker {
     layer.set_height(layer_.height);
     layer.set_channels(kFakeChannels);
     set_digest(*layer.mutable_blob());
+    report.mutable_bake_finished()->mutable_report()->mutable_run()->mutable_costs()->set_row_ray(kFakeRayCost);
     stream_.Write(report);
   }
 

@@ -28,6 +28,8 @@ inline constexpr int kTileSize = 8;
 inline constexpr int kFakeChannels = 4;
 /// Patches in every fake plan.
 inline constexpr int kFakePatches = 42;
+/// What every fake bake says that a ray of a row costs, seconds.
+inline constexpr double kFakeRayCost = 0.0625;
 inline constexpr char kLastWords[] = "the fake worker says good-bye";
 
 }  // namespace radbake::testing

@@ -104,8 +104,10 @@ Result<Client> Client::connect(const std::string& address, const ClientOptions& 
 }
 
 Result<v1::Bake> Client::submit(const v1::SubmitBakeRequest& request, std::stop_token stop) {
+  // What is only validated is planned meanwhile.
+  const ClientOptions& options = connection_->options;
   return call_with_retries<v1::Bake>(
-      *connection_, connection_->options.call_deadline, stop,
+      *connection_, request.validate_only() ? options.plan_deadline : options.call_deadline, stop,
       [&](auto* context, auto* response) { return connection_->bakes->SubmitBake(context, request, response); });
 }
 

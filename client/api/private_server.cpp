@@ -111,6 +111,7 @@ Result<void> PrivateServer::launch() {
 
   std::vector<std::string> arguments = {options_.program.string(),   "--listen",          address(), "--data",
                                         (folder_ / "data").string(), "--exit-with-parent"};
+  if (!options_.costs.empty()) arguments.insert(arguments.end(), {"--costs", options_.costs.string()});
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);

@@ -17,7 +17,8 @@ namespace radbake::api {
 class PrivateServer {
  public:
   struct Options {
-    std::filesystem::path program;                 ///< empty: radbaked beside the running executable
+    std::filesystem::path program;  ///< empty: radbaked beside the running executable
+    std::filesystem::path costs;    ///< file of what bakes cost on this host, outlives the server; empty: none
     std::chrono::milliseconds start_limit{15000};  ///< until it listens
     std::chrono::milliseconds stop_limit{5000};    ///< from SIGTERM to SIGKILL
   };

@@ -20,6 +20,8 @@ struct CommandContext {
 };
 
 ExitCode run_submit(const CommandContext& context);
+/// `radbake plan`, and `radbake submit --dry-run`.
+ExitCode run_plan(const CommandContext& context);
 ExitCode run_list(const CommandContext& context);
 ExitCode run_watch(const CommandContext& context);
 ExitCode run_cancel(const CommandContext& context);

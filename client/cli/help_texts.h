@@ -12,6 +12,7 @@ inline constexpr char kMainFooter[] =
     "\nExamples:\n"
     "  radbake submit room.glb -o baked/                 bake here, with a private server\n"
     "  radbake submit room.glb -o baked/ --server bakery:7419\n"
+    "  radbake plan room.glb                             what would be simulated, why, and what it takes\n"
     "  radbake submit --help                             what can be chosen, with more examples\n"
     "  export RADBAKE_SERVER=bakery:7419; radbake list   what the server bakes and has baked\n\n";
 
@@ -20,9 +21,10 @@ inline constexpr char kSubmitFooter[] =
     "  scene.glb        the scene with its light: nothing lost, final TEXCOORD_1, the lightmap as MOZ_lightmap,\n"
     "                   light by vertex as _IRRADIANCE\n"
     "  lightmap_N.exr   irradiance in lx, linear Rec.709, float32; alpha is coverage; see --encoding\n"
+    "  lightmap_N_direct.exr, lightmap_N_indirect.exr, lightmap_N_ao.exr   where --layers asks for them\n"
     "  lightmap_N.png   an exposed preview, for the eye only\n"
     "  lightmaps.json   which primitive of which node lies where in which lightmap\n"
-    "  report.json      what was done, how well, and how long it took\n"
+    "  report.json      what was planned, what was done, how well, and how long it took beside what was predicted\n"
     "The first line on stdout is the job's name. Ctrl-C cancels the job.\n"
     "\nExamples:\n"
     "  radbake submit room.glb -o baked/\n"
@@ -36,12 +38,34 @@ inline constexpr char kSubmitFooter[] =
     "      a quick preview over the results of an earlier bake\n"
     "  radbake submit house.glb -o baked/ --sky 3000,3500,5000 --sun 0.4,-1,0.3:80000,76000,70000\n"
     "      daylight: a blue sky, and a sun that stands high\n"
+    "  radbake submit house.glb -o baked/ --hdri dawn.exr:2500 --layers direct,indirect,ao\n"
+    "      light from a sky image whose 1 is 2500 nit; direct and indirect light and openness as maps of their own\n"
+    "  radbake submit room.glb -o baked/ --effect interreflection=off --effect alpha_mask=off\n"
+    "      direct light only, and leaves of a tree as full squares: what an effect is worth\n"
+    "  radbake submit room.glb --dry-run\n"
+    "      checks all, prints the plan, bakes nothing\n"
     "  radbake submit lab.glb -o baked/ --form-factors analytic --max-patches 500 --solver lu\n"
     "      a reference: form factors by formula, elimination; for small scenes\n"
     "  radbake submit city.glb -o baked/ --max-patches 200000 --memory 512M\n"
     "      form factors that do not fit are streamed: made again, row by row, each time they are used\n"
     "  radbake submit room.glb -o baked/ --json | jq -r 'select(.event == \"progress\") | .progress.fraction'\n"
     "      one event a line, for programs\n\n";
+
+inline constexpr char kPlanFooter[] =
+    "\nTakes all options of submit that decide a bake, and prints one page: facts of the scene; every effect as\n"
+    "  on           simulated\n"
+    "  off          there, and provably without effect here: --effect NAME=on simulates it all the same\n"
+    "  unsupported  in the scene, and not simulated\n"
+    "  absent       neither in the scene nor asked for\n"
+    "each with the reason; methods with theirs; predicted CPU time, wall time and memory; the costliest meshes.\n"
+    "[3 s] behind an effect is CPU time that it takes, or saves where it is off.\n"
+    "\nExamples:\n"
+    "  radbake plan room.glb\n"
+    "  radbake plan room.glb --sun 0.4,-1,0.3:80000,76000,70000 --rays 1024\n"
+    "  radbake plan room.glb --effect interreflection=off\n"
+    "      what is left without it, and what it would take\n"
+    "  radbake plan room.glb --json | jq -r '.effects[] | select(.state == \"on\") | .effect'\n"
+    "  radbake plan room.glb --json | jq .prediction.total.cpu_seconds\n\n";
 
 inline constexpr char kListFooter[] =
     "\nExamples:\n"

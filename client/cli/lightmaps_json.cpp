@@ -26,6 +26,18 @@ Json describe(const std::string& layer, Encoding encoding, double intensity) {
   return file;
 }
 
+/// What the numbers of a layer are, and where they stand.
+Json describe_layer(const LightmapFiles& lightmap, const FileChoices& files) {
+  Json json = {{"quantity", lightmap.layer.quantity()},
+               {"unit", lightmap.layer.unit()},
+               {"maximum", lightmap.max_irradiance},
+               {"files", Json::array()}};
+  for (const Encoding encoding : files.encodings) {
+    json["files"].push_back(describe(lightmap.layer.name(), encoding, lightmap.intensity));
+  }
+  return json;
+}
+
 const char* name_of(v1::UvSource source) {
   switch (source) {
     case v1::UV_KEPT: return "kept";
@@ -68,25 +80,26 @@ std::string image_name(const std::string& layer, Encoding encoding) {
   return {};
 }
 
-Json make_lightmaps_json(const std::vector<LightmapFiles>& lightmaps, const FileChoices& files,
-                         const gltf::GltfScene& scene, const std::vector<std::string>& node_names,
-                         const MeshResults& results) {
+Json make_lightmaps_json(const std::vector<LightmapFiles>& lightmaps, const std::vector<LightmapFiles>& extra_layers,
+                         const FileChoices& files, const gltf::GltfScene& scene,
+                         const std::vector<std::string>& node_names, const MeshResults& results) {
   Json json = {{"version", 1}, {"generator", std::string("radbake ") + kEngineVersion}, {"scene", "scene.glb"}};
   json["uv_origin"] = "top left";
   Json& maps = json["lightmaps"] = Json::array();
   for (const LightmapFiles& lightmap : lightmaps) {
-    Json map = {{"name", lightmap.layer.name()},
-                {"width", lightmap.layer.width()},
-                {"height", lightmap.layer.height()},
-                {"quantity", lightmap.layer.quantity()},
-                {"unit", lightmap.layer.unit()},
-                {"maximum", lightmap.max_irradiance},
-                {"files", Json::array()}};
-    for (const Encoding encoding : files.encodings) {
-      map["files"].push_back(describe(lightmap.layer.name(), encoding, lightmap.intensity));
-    }
+    Json map = {
+        {"name", lightmap.layer.name()}, {"width", lightmap.layer.width()}, {"height", lightmap.layer.height()}};
+    map.update(describe_layer(lightmap, files));
     map["moz_lightmap"] = {
         {"encoding", "png"}, {"bits", "uint16"}, {"intensity", lightmap.intensity}, {"colour_space", kColourSpace}};
+    // Parts of the same light, or openness, in the same layout.
+    for (const LightmapFiles& extra : extra_layers) {
+      const std::string& name = extra.layer.name();
+      if (!name.starts_with(lightmap.layer.name() + "_")) continue;
+      Json layer = {{"name", name}};
+      layer.update(describe_layer(extra, files));
+      map["layers"].push_back(std::move(layer));
+    }
     maps.push_back(std::move(map));
   }
   bool has_vertex_light = false;

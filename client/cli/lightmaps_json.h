@@ -17,15 +17,17 @@ std::string image_name(const std::string& layer, Encoding encoding);
 /// A lightmap of a result folder.
 struct LightmapFiles {
   v1::Layer layer;
-  double max_irradiance = 0;  ///< over all texels and channels, lx
+  double max_irradiance = 0;  ///< over all texels and channels, in the layer's unit
   double intensity = 1;       ///< lx that 1 stands for in RGBM and in MOZ_lightmap; positive
 };
 
 /// lightmaps.json: which primitive of which node lies where in which file, and what the numbers in the files mean.
 /// Every key is described in client/cli/docs/lightmaps.md.
 ///
+/// `extra_layers`: lightmap_N_direct and the like, listed under the lightmap_N whose layout they share.
 /// `node_names`: of the file, [nodes]. Equal bakes give equal bytes.
-nlohmann::ordered_json make_lightmaps_json(const std::vector<LightmapFiles>& lightmaps, const FileChoices& files,
+nlohmann::ordered_json make_lightmaps_json(const std::vector<LightmapFiles>& lightmaps,
+                                           const std::vector<LightmapFiles>& extra_layers, const FileChoices& files,
                                            const gltf::GltfScene& scene, const std::vector<std::string>& node_names,
                                            const MeshResults& results);
 

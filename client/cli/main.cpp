@@ -12,6 +12,7 @@ using namespace radbake::cli;
 ExitCode run(const CommandContext& context) {
   switch (context.line.command) {
     case Command::kSubmit: return run_submit(context);
+    case Command::kPlan: return run_plan(context);
     case Command::kList: return run_list(context);
     case Command::kWatch: return run_watch(context);
     case Command::kCancel: return run_cancel(context);
@@ -35,7 +36,7 @@ int main(int argc, char** argv) {
   }
   const CommandLine& line = std::get<CommandLine>(parsed);
   const Interrupt interrupt;
-  const bool is_stream = line.command == Command::kSubmit || line.command == Command::kWatch;
+  const bool is_stream = (line.command == Command::kSubmit && !line.dry_run) || line.command == Command::kWatch;
   const auto reporter = line.json ? make_json_reporter(is_stream) : make_text_reporter();
   return run({line, *reporter, interrupt});
 }

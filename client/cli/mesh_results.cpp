@@ -44,8 +44,10 @@ Result<void> check_values(const std::vector<std::array<float, N>>& values, const
 
 Result<int> layer_of(const v1::BakeResult& result, std::uint32_t lightmap) {
   const std::string name = "lightmap_" + std::to_string(lightmap);
-  for (int i = 0; i < result.layers_size(); ++i) {
-    if (result.layers(i).name() == name) return i;
+  int index = 0;
+  for (const v1::Layer& layer : result.layers()) {
+    if (layer.name() == name) return index;
+    if (is_lightmap(layer.name())) ++index;
   }
   return internal_error("it lies in " + name + ", which is not there");
 }
@@ -118,6 +120,12 @@ Result<gltf::BakedMesh> read_mesh(const v1::BakeResult& result, const v1::MeshRe
 }
 
 }  // namespace
+
+bool is_lightmap(const std::string& layer) {
+  const std::string prefix = "lightmap_";
+  return layer.starts_with(prefix) && layer.size() > prefix.size() &&
+         layer.find_first_not_of("0123456789", prefix.size()) == std::string::npos;
+}
 
 Result<MeshResults> read_mesh_results(const v1::BakeResult& result, const std::string& data, const Scene& scene,
                                       const std::vector<int>& scene_meshes) {

@@ -27,13 +27,14 @@ class Parser {
     app_.footer(kMainFooter + std::string(kExitCodes));
     app_.require_subcommand(1);
     add_submit();
+    add_plan();
     add_command(Command::kList, "list", "List the server's bakes, newest first", kListFooter);
     add_job(add_command(Command::kWatch, "watch", "Follow a bake to its end", kWatchFooter));
     add_job(add_command(Command::kCancel, "cancel", "Ask a bake to stop", kCancelFooter));
     CLI::App* download =
         add_command(Command::kDownload, "download", "Write a bake's results to a folder", kDownloadFooter);
     add_job(download);
-    add_folder(download);
+    add_folder(download, true);
     add_files(download);
     download->add_option("--scene", line_.scene, "The .glb or .gltf file that was baked: writes scene.glb as well")
         ->type_name("SCENE");
@@ -53,10 +54,14 @@ class Parser {
     // Not by CLI11's envname: it sets the options of all commands, also of those that were not given.
     const char* server = std::getenv("RADBAKE_SERVER");
     if (line_.server.empty() && server != nullptr) line_.server = server;
-    if (line_.server.empty() && line_.command != Command::kSubmit && line_.command != Command::kCapabilities) {
+    if (line_.server.empty() && line_.command != Command::kSubmit && line_.command != Command::kPlan &&
+        line_.command != Command::kCapabilities) {
       return EarlyExit{kUsage, "",
                        "radbake " + app_.get_subcommands().front()->get_name() +
                            " needs a server: --server HOST:PORT or unix:PATH, or RADBAKE_SERVER\n"};
+    }
+    if (line_.command == Command::kSubmit && line_.folder.empty() && !line_.dry_run) {
+      return EarlyExit{kUsage, "", "--out is required: the folder for the results, or --dry-run\n"};
     }
     if (line_.command == Command::kSubmit && line_.files.vertex_colors && line_.bake.output == v1::OUTPUT_LIGHTMAP) {
       return EarlyExit{kUsage, "", "--vertex-colors needs light by vertex: --output vertices or --output both\n"};
@@ -86,9 +91,9 @@ class Parser {
     sub->add_option("JOB", line_.job, "The bake's name, as submit prints it")->required()->type_name("");
   }
 
-  void add_folder(CLI::App* sub) {
+  void add_folder(CLI::App* sub, bool is_required) {
     sub->add_option("-o,--out", line_.folder, "Folder for the results; is made where there is none")
-        ->required()
+        ->required(is_required)
         ->type_name("DIR");
     sub->add_flag("--force", line_.force, "Write to DIR even if it is not empty");
   }
@@ -118,9 +123,23 @@ class Parser {
   void add_submit() {
     CLI::App* sub = add_command(Command::kSubmit, "submit", "Bake a glTF scene", kSubmitFooter);
     sub->add_option("SCENE", line_.scene, "A .glb or .gltf file")->required()->type_name("");
-    add_folder(sub);
+    add_folder(sub, false);
+    sub->add_flag("--dry-run", line_.dry_run,
+                  "Check all that a submit checks and print the plan, as radbake plan does; bakes and writes nothing");
     options::add_bake_options(*sub, line_.bake);
     add_files(sub);
+  }
+
+  void add_plan() {
+    CLI::App* sub =
+        add_command(Command::kPlan, "plan",
+                    "Say what a bake would simulate and why, how long it takes and what it needs", kPlanFooter);
+    sub->add_option("SCENE", line_.scene, "A .glb or .gltf file")->required()->type_name("");
+    options::add_bake_options(*sub, line_.bake);
+    sub->add_option("--deadline", line_.plan_seconds, "Seconds to wait for the plan")
+        ->check(CLI::Range(1.0, 86400.0))
+        ->capture_default_str()
+        ->type_name("S");
   }
 
   CommandLine line_;

@@ -9,7 +9,7 @@
 
 namespace radbake::cli {
 
-enum class Command { kSubmit, kList, kWatch, kCancel, kDownload, kCapabilities };
+enum class Command { kSubmit, kPlan, kList, kWatch, kCancel, kDownload, kCapabilities };
 
 using options::BakeChoices;
 
@@ -27,12 +27,17 @@ struct CommandLine {
   Command command = Command::kCapabilities;
   std::string server;  ///< empty: a private one
   bool json = false;
-  std::filesystem::path scene;   ///< submit; download: empty where it is not given
-  BakeChoices bake;              ///< submit
+  std::filesystem::path scene;   ///< submit, plan; download: empty where it is not given
+  BakeChoices bake;              ///< submit, plan
   std::string job;               ///< watch, cancel, download: bakes/ID
   std::filesystem::path folder;  ///< submit, download
   bool force = false;            ///< submit, download
   FileChoices files;             ///< submit, download
+  bool dry_run = false;          ///< submit
+  double plan_seconds = 60;      ///< plan: how long to wait for the answer
+
+  /// Nothing is baked and nothing written.
+  bool only_plans() const { return command == Command::kPlan || dry_run; }
 };
 
 /// The program is to print this and end: help, version, or what is wrong with the command line.

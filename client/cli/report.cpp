@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "client/cli/predictions.h"
 #include "client/cli/proto_json.h"
 
 namespace radbake::cli {
@@ -46,6 +47,9 @@ Json make_report(const v1::Bake& bake, const std::vector<LayerFiles>& layers, co
   report["warnings"] = std::move(warnings);
 
   Json run = server.contains("run") ? server["run"] : Json::object();
+  if (bake.result().report().run().has_prediction()) {
+    run["predicted_and_actual"] = prediction_table(bake.result().report().run());
+  }
   run["job"] = bake.name();
   run["attempt"] = bake.attempt();
   Json& client = run["client"] = {{"stages", Json::array()}};

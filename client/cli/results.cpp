@@ -99,7 +99,8 @@ class ResultWriter {
       const std::filesystem::path path = add(image_name(layer, encoding));
       const auto write = [&]() -> Result<void> {
         switch (encoding) {
-          case Encoding::kExr: return images.write_exr(path, width, height, channels, plane.values);
+          case Encoding::kExr:
+            return images.write_exr(path, width, height, channels, plane.values, plane.files.layer.unit());
           case Encoding::kHdr: return images.write_hdr(path, width, height, channels, plane.values);
           case Encoding::kRgbmPng:
             return images.write_rgbm_png(path, width, height, channels, plane.values, plane.files.intensity);
@@ -111,6 +112,7 @@ class ResultWriter {
     return images.write_preview_png(add(layer + ".png"), width, height, channels, plane.values);
   }
 
+  /// The lightmaps of all light go into the scene; other layers are only named beside them.
   Result<void> write_scene(const image::ImageCodec* images, const std::vector<Plane>& planes, const BakedScene& scene,
                            const MeshResults& meshes) {
     // Hours may have passed since the scene was read.
@@ -121,7 +123,12 @@ class ResultWriter {
     }
     std::vector<gltf::LightmapImage> attached;
     std::vector<LightmapFiles> lightmaps;
+    std::vector<LightmapFiles> extra_layers;
     for (const Plane& plane : planes) {
+      if (!is_lightmap(plane.files.layer.name())) {
+        extra_layers.push_back(plane.files);
+        continue;
+      }
       RADBAKE_ASSIGN_OR_RETURN(std::string png,
                                images->encode_linear_png(plane.width(), plane.height(), plane.channels(), plane.values,
                                                          plane.files.intensity));
@@ -133,7 +140,8 @@ class ResultWriter {
     RADBAKE_RETURN_IF_ERROR(
         gltf::write_gltf(add(kSceneName), scene.path, scene.scene, meshes.meshes, attached, options));
     RADBAKE_ASSIGN_OR_RETURN(const std::vector<std::string> node_names, gltf::read_node_names(scene.path));
-    return write_json(kLightmapsName, make_lightmaps_json(lightmaps, choices_, scene.scene, node_names, meshes));
+    return write_json(kLightmapsName,
+                      make_lightmaps_json(lightmaps, extra_layers, choices_, scene.scene, node_names, meshes));
   }
 
   Result<void> write_json(const char* name, const nlohmann::ordered_json& json) {

@@ -1,17 +1,50 @@
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
 #include "client/cli/commands.h"
 
 namespace radbake::cli {
+namespace {
+
+api::ClientOptions client_options(const CommandLine& line) {
+  api::ClientOptions options;
+  options.plan_deadline = std::chrono::milliseconds(std::llround(1000 * line.plan_seconds));
+  return options;
+}
+
+/// Where a private server keeps what bakes cost on this host: in the user's cache folder. Empty where none can be had;
+/// predictions then come from pilots alone.
+std::filesystem::path costs_file() {
+  namespace fs = std::filesystem;
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  fs::path folder;
+  // A relative path is to be ignored: XDG Base Directory Specification.
+  if (cache != nullptr && fs::path(cache).is_absolute()) {
+    folder = cache;
+  } else if (home != nullptr && fs::path(home).is_absolute()) {
+    folder = fs::path(home) / ".cache";
+  }
+  if (folder.empty()) return {};
+  std::error_code failure;
+  fs::create_directories(folder / "radbake", failure);
+  return failure ? fs::path() : folder / "radbake" / "costs";
+}
+
+}  // namespace
 
 Result<Session> open_session(const CommandContext& context) {
   std::optional<api::PrivateServer> private_server;
   std::string address = context.line.server;
   if (address.empty()) {
-    Result<api::PrivateServer> started = api::PrivateServer::start({});
+    Result<api::PrivateServer> started = api::PrivateServer::start({.program = {}, .costs = costs_file()});
     if (!started.ok()) return started.error();
     private_server.emplace(std::move(started).value());
     address = private_server->address();
   }
-  Result<api::Client> client = api::Client::connect(address, {}, context.interrupt.once());
+  Result<api::Client> client = api::Client::connect(address, client_options(context.line), context.interrupt.once());
   if (!client.ok()) {
     Error error = client.error();
     if (private_server) error.message += private_server->log_tail();

@@ -121,14 +121,14 @@ double exposed_luminance(std::span<const float> values, int channels) {
 }  // namespace
 
 Result<void> write_exr(const std::filesystem::path& path, int width, int height, int channels,
-                       std::span<const float> values) {
+                       std::span<const float> values, const std::string& unit) {
   RADBAKE_RETURN_IF_ERROR(check_shape(path, width, height, channels, 1, values.size()));
   OIIO::ImageSpec spec(width, height, channels, OIIO::TypeDesc::FLOAT);
   spec.attribute("compression", "zip");
   spec.attribute("oiio:ColorSpace", "Linear");
   constexpr float kRec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
   spec.attribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8), kRec709);
-  spec.attribute("unit", "lx");
+  spec.attribute("unit", unit);
   spec.attribute("DateTime", "");  // else the time of writing goes in, and equal maps have other bytes
   return encode(path, spec, OIIO::TypeDesc::FLOAT, values.data());
 }

@@ -9,14 +9,14 @@
 
 namespace radbake::image {
 
-/// Writes float32 EXR with zip compression: scene-linear Rec.709, values in lx (in the metadata).
+/// Writes float32 EXR with zip compression: scene-linear Rec.709, values in `unit` (in the metadata).
 /// The bytes depend on the arguments alone. The file appears whole or not at all, also after a power
 /// loss: written aside, brought to the disk and renamed.
 ///
 /// Shapes: values [height * width * channels], rows from the top; channels 1 to 4: R, G, B, A.
 /// Errors: kInternal if it cannot be written; kInvalidArgument if values have another size.
 Result<void> write_exr(const std::filesystem::path& path, int width, int height, int channels,
-                       std::span<const float> values);
+                       std::span<const float> values, const std::string& unit = "lx");
 
 /// Writes a preview for the eye: PNG, 8 bits, opaque.
 ///

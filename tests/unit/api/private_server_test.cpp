@@ -51,6 +51,21 @@ class PrivateServerStart : public testing::Test {
 
 constexpr char kServes[] = "echo \"radbaked 1.0 listening on $2\"; exec sleep 1000\n";
 
+TEST_F(PrivateServerStart, HandsOnTheFileOfCostsThatOutlivesIt) {
+  const fs::path seen = folder_ / "arguments";
+  const std::string notes_arguments = "echo \"$*\" > " + seen.string() + "\n";
+  const auto arguments = [&] {
+    std::ifstream file(seen);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  PrivateServer::Options options = script(notes_arguments + kServes);
+  ASSERT_TRUE(PrivateServer::start(options).ok());
+  EXPECT_THAT(arguments(), testing::Not(HasSubstr("--costs")));
+  options.costs = folder_ / "cache" / "costs";
+  ASSERT_TRUE(PrivateServer::start(options).ok());
+  EXPECT_THAT(arguments(), HasSubstr("--costs " + options.costs.string()));
+}
+
 TEST_F(PrivateServerStart, StopsTheServerAndRemovesItsFolder) {
   Result<PrivateServer> started = PrivateServer::start(script(kServes));
   ASSERT_TRUE(started.ok()) << started.error().message;

@@ -14,6 +14,7 @@ struct Fixture {
   gltf::GltfScene scene;
   MeshResults results;
   LightmapFiles lightmap;
+  std::vector<LightmapFiles> extra_layers;
   FileChoices files;
 
   Fixture() {
@@ -34,7 +35,8 @@ struct Fixture {
   }
 
   Json json() const {
-    return make_lightmaps_json({lightmap}, files, scene, {"", "", "", "", "floor", "", "", "caf\xC3\xA9"}, results);
+    return make_lightmaps_json({lightmap}, extra_layers, files, scene, {"", "", "", "", "floor", "", "", "caf\xC3\xA9"},
+                               results);
   }
 };
 
@@ -65,6 +67,25 @@ TEST(LightmapsJson, SaysWhatTheNumbersInEachFileMean) {
   EXPECT_EQ(map["files"][2]["encoding"], "exr");
   EXPECT_EQ(map["moz_lightmap"]["intensity"], 1234.5);
   EXPECT_EQ(json["meshes"][0]["file"], "lightmap_0_rgbm.png");  // the first that was asked for
+}
+
+TEST(LightmapsJson, ListsTheLayersThatShareALayout) {
+  Fixture fixture;
+  EXPECT_FALSE(fixture.json()["lightmaps"][0].contains("layers"));
+  for (const char* name : {"lightmap_0_direct", "lightmap_0_ao", "lightmap_01_ao"}) {
+    fixture.extra_layers.push_back(fixture.lightmap);
+    fixture.extra_layers.back().layer.set_name(name);
+  }
+  fixture.extra_layers[1].layer.set_quantity("openness");
+  fixture.extra_layers[1].layer.set_unit("1");
+  fixture.extra_layers[1].max_irradiance = 1;
+  const Json layers = fixture.json()["lightmaps"][0]["layers"];
+  ASSERT_EQ(layers.size(), 2u);  // another lightmap's is not among them
+  EXPECT_EQ(layers[0]["name"], "lightmap_0_direct");
+  EXPECT_EQ(layers[0]["unit"], "lx");
+  EXPECT_EQ(layers[1].dump(), R"({"name":"lightmap_0_ao","quantity":"openness","unit":"1","maximum":1.0,)"
+                              R"("files":[{"file":"lightmap_0_ao.exr","encoding":"exr","bits":"float32",)"
+                              R"("colour_space":"linear Rec.709"}]})");
 }
 
 TEST(LightmapsJson, DescribesLightByVertexWhereThereIsAny) {

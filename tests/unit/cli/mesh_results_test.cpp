@@ -96,6 +96,20 @@ TEST(MeshResults, ReadsThePlaceOfAnOwnLayoutWithoutAnyData) {
   EXPECT_EQ(answer.read()->meshes[1].uv_scale, (Vec2{1, 1}));
 }
 
+TEST(MeshResults, CountLightmapsAndNotTheLayersBetweenThem) {
+  Answer answer;
+  answer.result.clear_layers();
+  for (const char* name : {"lightmap_0", "lightmap_0_direct", "lightmap_0_ao", "lightmap_1", "lightmap_1_direct"}) {
+    answer.result.add_layers()->set_name(name);
+  }
+  ASSERT_TRUE(answer.read().ok());
+  EXPECT_EQ(answer.read()->meshes[1].lightmap, 1);
+  EXPECT_TRUE(is_lightmap("lightmap_12"));
+  for (const char* other : {"lightmap_", "lightmap", "lightmap_1_ao", "lightmap_x", "map_1"}) {
+    EXPECT_FALSE(is_lightmap(other)) << other;
+  }
+}
+
 struct BadAnswer {
   std::function<void(Answer&)> change;
   std::string named;

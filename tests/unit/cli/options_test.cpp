@@ -192,6 +192,29 @@ TEST_F(Options, NamesWhatIsMissing) {
   EXPECT_THAT(refused({"watch", "--server", "s"}).err, HasSubstr("JOB"));
 }
 
+TEST_F(Options, PlanTakesWhatDecidesABakeAndNoFolder) {
+  const CommandLine line =
+      accepted({"plan", "scene.glb", "--sky", "1,2,3", "--rays", "64", "--effect", "color=off", "--deadline", "2.5"});
+  EXPECT_EQ(line.command, Command::kPlan);
+  EXPECT_TRUE(line.only_plans());
+  EXPECT_EQ(line.scene, "scene.glb");
+  EXPECT_EQ(line.bake.rays, 64u);
+  EXPECT_EQ(line.bake.effects.at("color"), v1::EFFECT_CHOICE_OFF);
+  EXPECT_EQ(line.plan_seconds, 2.5);
+  EXPECT_EQ(accepted({"plan", "scene.glb"}).plan_seconds, 60);
+  EXPECT_EQ(refused({"plan", "scene.glb", "-o", "out"}).code, kUsage);
+  EXPECT_EQ(refused({"plan"}).code, kUsage);
+  EXPECT_EQ(refused({"plan", "scene.glb", "--deadline", "0"}).code, kUsage);
+}
+
+TEST_F(Options, ADryRunNeedsNoFolder) {
+  const CommandLine line = accepted({"submit", "scene.glb", "--dry-run"});
+  EXPECT_TRUE(line.only_plans());
+  EXPECT_TRUE(line.folder.empty());
+  EXPECT_FALSE(accepted(submit_with({})).only_plans());
+  EXPECT_TRUE(accepted(submit_with({"--dry-run"})).only_plans());
+}
+
 TEST_F(Options, TakesTheSceneOfADownload) {
   const CommandLine line = accepted(
       {"download", "3f", "-o", "out", "--server", "s", "--scene", "room.glb", "--encoding", "hdr", "--vertex-colors"});
@@ -210,7 +233,7 @@ TEST_F(Options, SubmitNamesEveryFileThatItWrites) {
 }
 
 TEST_F(Options, HelpsEverywhereWithExamples) {
-  for (const char* command : {"submit", "list", "watch", "cancel", "download", "capabilities"}) {
+  for (const char* command : {"submit", "plan", "list", "watch", "cancel", "download", "capabilities"}) {
     const EarlyExit exit = refused({command, "--help"});
     EXPECT_EQ(exit.code, kDone);
     EXPECT_THAT(exit.err, IsEmpty());

@@ -68,6 +68,18 @@ TEST(Report, KeepsAllThatMayDifferBetweenEqualRunsUnderItsLastKey) {
   EXPECT_EQ(to_text(first), to_text(second));
 }
 
+TEST(Report, HoldsWhatWasPredictedAmongWhatMayDiffer) {
+  v1::Bake bake = finished_bake();
+  EXPECT_FALSE(make_report(bake, {}, std::nullopt, {})["run"].contains("predicted_and_actual"));
+  v1::RunReport& run = *bake.mutable_result()->mutable_report()->mutable_run();
+  run.set_cpu_seconds(3);
+  run.mutable_prediction()->mutable_total()->set_cpu_seconds(2);
+  const auto report = make_report(bake, {}, std::nullopt, {});
+  EXPECT_EQ(report["run"]["predicted_and_actual"]["total"]["predicted_cpu_seconds"], 2);
+  EXPECT_EQ(report["run"]["predicted_and_actual"]["total"]["actual_cpu_seconds"], 3);
+  EXPECT_FALSE(report["plan"].contains("prediction"));
+}
+
 TEST(Report, OfADownloadHasNoReadersPart) {
   const auto report = make_report(finished_bake(), {}, std::nullopt, {});
   EXPECT_FALSE(report["scene"].contains("num_triangles_dropped"));

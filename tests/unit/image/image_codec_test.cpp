@@ -55,7 +55,7 @@ TEST_F(ImageCodecTest, WritesAndReadsThroughTheLibrary) {
   const auto codec = load_image_codec(RADBAKE_IMAGE_LIBRARY);
   ASSERT_TRUE(codec.ok()) << codec.error().message;
   const std::vector<float> grey(4 * 2 * 3, 1.0f);
-  ASSERT_TRUE((*codec)->write_exr(folder_ / "map.exr", 4, 2, 3, grey).ok());
+  ASSERT_TRUE((*codec)->write_exr(folder_ / "map.exr", 4, 2, 3, grey, "lx").ok());
   EXPECT_THAT(text_of(folder_ / "map.exr"), ::testing::StartsWith("\x76\x2f\x31\x01"));  // OpenEXR's magic number
   ASSERT_TRUE((*codec)->write_preview_png(folder_ / "map.png", 4, 2, 3, grey).ok());
   const std::string png = text_of(folder_ / "map.png");
@@ -67,7 +67,7 @@ TEST_F(ImageCodecTest, WritesAndReadsThroughTheLibrary) {
   ASSERT_TRUE(sky.ok()) << sky.error().message;
   EXPECT_EQ(sky->values, std::vector<float>(24, 2.0f));
   // Errors cross the border too.
-  const auto refused = (*codec)->write_exr(folder_ / "none" / "map.exr", 4, 2, 3, grey);
+  const auto refused = (*codec)->write_exr(folder_ / "none" / "map.exr", 4, 2, 3, grey, "lx");
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.error().message, HasSubstr("none/map.exr: No such file"));
 }

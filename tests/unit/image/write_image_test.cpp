@@ -79,6 +79,9 @@ TEST_F(WriteImage, ExrSaysWhatItsNumbersAre) {
   ASSERT_NE(chromaticities, nullptr);
   EXPECT_EQ(static_cast<const float*>(chromaticities->data())[0], 0.64f);
   EXPECT_EQ(static_cast<const float*>(chromaticities->data())[7], 0.329f);
+  // Openness is a share.
+  ASSERT_TRUE(write_exr(file("ao.exr"), 5, 3, 4, ramp(5, 3), "1").ok());
+  EXPECT_EQ(OIIO::ImageInput::open(file("ao.exr").string())->spec().get_string_attribute("unit"), "1");
 }
 
 TEST_F(WriteImage, EqualImagesHaveEqualBytesAndNoDate) {

@@ -5,6 +5,7 @@ import json
 import math
 import pathlib
 import struct
+import zlib
 
 # A unit square that faces up, two triangles.
 POSITIONS = [(0, 0, 0), (1, 0, 0), (1, 0, -1), (0, 0, -1)]
@@ -52,6 +53,79 @@ def floats(gltf, chunk, accessor):
     start = view.get("byteOffset", 0) + entry.get("byteOffset", 0)
     stride = view.get("byteStride", 4 * width)
     return [x for i in range(entry["count"]) for x in struct.unpack_from(f"<{width}f", chunk, start + i * stride)]
+
+
+def exr(width, height, pixels):
+    """An OpenEXR image, not compressed: rows of (r, g, b) from the top."""
+    def attribute(name, kind, value):
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<I", len(value)) + value
+    channels = b"".join(name + b"\0" + struct.pack("<IIII", 2, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
+    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    head = struct.pack("<II", 20000630, 2) + attribute("channels", "chlist", channels)
+    head += attribute("compression", "compression", b"\0") + attribute("dataWindow", "box2i", box)
+    head += attribute("displayWindow", "box2i", box) + attribute("lineOrder", "lineOrder", b"\0")
+    head += attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    head += attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0))
+    head += attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
+    size = 12 * width
+    lines, offsets = b"", b""
+    for y in range(height):
+        row = pixels[y * width:(y + 1) * width]
+        offsets += struct.pack("<Q", len(head) + 8 * height + y * (8 + size))
+        lines += struct.pack("<iI", y, size) + b"".join(struct.pack("<f", p[c]) for c in (2, 1, 0) for p in row)
+    return head + offsets + lines
+
+
+def read_exr(content):
+    """{channel: rows of floats} of an OpenEXR image of float32 channels as radbake writes it: ZIP, 16 lines a block."""
+    at, names, box = 8, [], None
+    while content[at] != 0:
+        name, kind, rest = content[at:].split(b"\0", 2)
+        at += len(name) + len(kind) + 2
+        size, = struct.unpack_from("<I", content, at)
+        value = content[at + 4:at + 4 + size]
+        at += 4 + size
+        if name == b"dataWindow":
+            box = struct.unpack("<4i", value)
+        elif name == b"compression":
+            assert value == b"\3", "not ZIP"
+        elif name == b"channels":
+            while value != b"\0":
+                channel, value = value.split(b"\0", 1)
+                assert struct.unpack_from("<I", value)[0] == 2, "not float32"
+                names.append(channel.decode())
+                value = value[16:]
+    at += 1
+    width, height = box[2] - box[0] + 1, box[3] - box[1] + 1
+    rows = {name: [] for name in names}
+    for block in range((height + 15) // 16):
+        offset, = struct.unpack_from("<Q", content, at + 8 * block)
+        _, size = struct.unpack_from("<iI", content, offset)
+        data = content[offset + 8:offset + 8 + size]
+        num_lines = min(16, height - 16 * block)
+        if size < 4 * width * len(names) * num_lines:  # else it stands as it is
+            # Differences to the byte before, the even bytes before the odd ones.
+            data = bytearray(zlib.decompress(data))
+            for i in range(1, len(data)):
+                data[i] = (data[i - 1] + data[i] - 128) & 255
+            half = (len(data) + 1) // 2
+            data = bytes(data[i // 2 + (half if i % 2 else 0)] for i in range(len(data)))
+        floats_of = iter(struct.unpack(f"<{len(data) // 4}f", data))
+        for _ in range(num_lines):
+            for name in names:
+                rows[name].append([next(floats_of) for _ in range(width)])
+    return rows
+
+
+def lit_by(light, **scene):
+    """The square, dark but for one lamp of KHR_lights_punctual above it that shines down."""
+    gltf = square(emissive=(0, 0, 0), **scene)
+    gltf["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+    gltf["nodes"].append({"name": "lamp", "translation": [0.5, 1, -0.5],
+                          "rotation": [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)],
+                          "extensions": {"KHR_lights_punctual": {"light": 0}}})
+    gltf["scenes"][0]["nodes"].append(1)
+    return gltf
 
 
 def with_change(change):
@@ -197,6 +271,11 @@ def bad_scenes(glb: pathlib.Path):
         ("uv_nan.gltf", with_change(_texture_transform({"offset": [math.nan, 0]})), "JSON"),
         ("uv_null.gltf", with_change(_texture_transform({"rotation": None})), "rotation is null"),
         ("uv_sets.gltf", with_change(_two_sets), "TEXCOORD_2"),
+        ("spot.gltf", json.dumps(lit_by({"type": "spot", "spot": {"innerConeAngle": 0.75, "outerConeAngle": 0.5}})).encode(),
+         "innerConeAngle 0.750000 is not below outerConeAngle 0.500000"),
+        ("roughness.gltf", with_change(_set(["materials", 0, "pbrMetallicRoughness", "roughnessFactor"], 2)), "roughnessFactor is 2"),
+        ("thickness.gltf", with_change(_set(["materials", 0, "extensions"], {"KHR_materials_volume": {"thicknessFactor": -3}})),
+         "thicknessFactor is -3"),
         ("texel_density.gltf", with_change(_set(["nodes", 0, "extras"], {"radbake_texel_density": 1000})), "1000"),
         ("instances.gltf", with_change(_instances_without_end), "limit of 50000000"),
         ("matrix.gltf", with_change(_set(["nodes", 0, "matrix"], [1, 0, 0, 5] + [0, 1, 0, 0] + [0, 0, 1, 0] + [0, 0, 0, 1])),

@@ -32,7 +32,10 @@ class CliTest(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.place, ignore_errors=True)
         self.tmp = self.place / "tmp"
         self.tmp.mkdir()
-        self.env = {**os.environ, "TMPDIR": str(self.tmp)}
+        # Not in the test's own folder, which tests look into.
+        self.cache = pathlib.Path(tempfile.mkdtemp(prefix="radbake-cache-"))
+        self.addCleanup(shutil.rmtree, self.cache, ignore_errors=True)
+        self.env = {**os.environ, "TMPDIR": str(self.tmp), "XDG_CACHE_HOME": str(self.cache)}
         self.env.pop("RADBAKE_SERVER", None)
 
     def run_cli(self, *arguments, **environment):
@@ -300,6 +303,190 @@ class Outputs(CliTest):
             self.assertLessEqual({"TEXCOORD_1", "_IRRADIANCE"}, set(self.primitive(entry)["attributes"]))
 
 
+class Plans(CliTest):
+    """What a bake would do, before it does it; effects and layers by name."""
+
+    def write(self, name, content):
+        path = self.place / name
+        path.write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
+        return path
+
+    def plan(self, scene, *arguments):
+        result = self.run_cli("plan", scene, "--json", *QUICK, *arguments)
+        self.assert_exit(result, 0)
+        self.assertEqual(len(result.stdout.splitlines()), 1)
+        return json.loads(result.stdout)
+
+    def states(self, scene, *arguments):
+        return {effect["effect"]: effect["state"] for effect in self.plan(scene, *arguments)["effects"]}
+
+    def bake(self, scene, *arguments):
+        self.assert_exit(self.run_cli("submit", scene, "-o", self.place / "out", "--force", *QUICK, *arguments), 0)
+        return json.loads((self.place / "out" / "report.json").read_text())
+
+    def covered(self, name):
+        """Values of the covered texels of a layer, red first."""
+        rows = cli_scenes.read_exr((self.place / "out" / name).read_bytes())
+        return [tuple(rows[c][y][x] for c in "RGB") for y, line in enumerate(rows["A"]) for x, a in enumerate(line) if a > 0]
+
+    def test_a_plan_is_one_page_and_leaves_nothing(self):
+        result = self.run_cli("plan", CORNELL, *QUICK)
+        self.assert_exit(result, 0)
+        self.assertIn("cornell.glb: 46 triangles in 4 meshes", result.stdout)
+        for word in ("Effects", "emitters", "interreflection", "absent", "Methods", "form factors", "solver",
+                     "Predicted", "gathering", "in all", "Costliest meshes", "cornell/cornell#3"):
+            self.assertIn(word, result.stdout)
+        self.assertLess(len(result.stdout.splitlines()), 60)
+        self.assert_nothing_left()
+
+    def test_a_plan_names_every_effect_that_can_be_overridden(self):
+        unknown = self.run_cli("plan", CORNELL, "--effect", "caustics=on")
+        self.assert_exit(unknown, 2)
+        known = unknown.stderr.split("'caustics' is none of ")[1].splitlines()[0].split(", ")
+        plan = self.plan(CORNELL)
+        self.assertEqual(list(plan)[0], "effects")
+        self.assertEqual([effect["effect"] for effect in plan["effects"]], known)
+        self.assertEqual(len(set(known)), 22)
+        for effect in plan["effects"]:
+            self.assertIn(effect["state"], ("on", "off", "absent", "unsupported"))
+            self.assertTrue(effect["reason"], effect)
+            self.assertGreaterEqual(effect["seconds"], 0)
+        self.assertGreater(plan["num_patches"], 0)
+        self.assertGreater(plan["prediction"]["total"]["cpu_seconds"], 0)
+        self.assertLessEqual(plan["prediction"]["total"]["cpu_seconds_low"], plan["prediction"]["total"]["cpu_seconds"])
+        self.assertEqual([stage["stage"] for stage in plan["client_stages"]],
+                         ["connect", "read", "encode", "upload", "plan"])
+
+    def test_a_plan_turns_on_what_the_command_line_adds(self):
+        scene = self.write("floor.gltf", cli_scenes.square())
+        sky = self.write("dawn.exr", cli_scenes.exr(4, 2, [(1, 1, 1)] * 8))
+        plain = self.states(scene)
+        self.assertEqual(plain["emitters"], "on")
+        for name, arguments in (("sky", ["--sky", "1,1,1"]), ("hdri", ["--hdri", sky]), ("sun", ["--sun", "0,-1,0:9,9,9"]),
+                                ("directional", ["--sun", "0,-1,0:9,9,9:0"]), ("vertices", ["--output", "both"]),
+                                ("layers", ["--layers", "direct"]), ("ambient_occlusion", ["--layers", "ao"])):
+            with self.subTest(effect=name):
+                self.assertEqual(plain[name], "absent")
+                states = self.states(scene, *arguments)
+                self.assertEqual(states[name], "on")
+                self.assertEqual({k for k in states if k not in (name, "occlusion") and states[k] != plain[k]}, set())
+
+    def test_a_dry_run_is_a_plan(self):
+        arguments = ["--effect", "interreflection=off", "--sky", "5,5,5"]
+        plan = self.plan(CORNELL, *arguments)
+        dry = self.run_cli("submit", CORNELL, "--dry-run", "--json", *QUICK, *arguments)
+        self.assert_exit(dry, 0)
+        answer = json.loads(dry.stdout)
+        for measured in ("prediction", "client_stages"):
+            del plan[measured], answer[measured]
+        for effect in plan["effects"] + answer["effects"]:
+            del effect["seconds"]
+        self.assertEqual(answer, plan)
+        self.assertIn("interreflection", self.run_cli("submit", CORNELL, "--dry-run", "-o", self.place / "out", *QUICK).stdout)
+        self.assert_nothing_left()
+
+    def test_an_override_that_contradicts_the_scene_is_refused_by_name(self):
+        for command in (["plan"], ["submit", "--dry-run"], ["submit", "-o", self.place / "out"]):
+            with self.subTest(command=command):
+                result = self.run_cli(*command, CORNELL, "--effect", "sun=on", *QUICK)
+                self.assert_exit(result, 3)
+                self.assertIn("'sun'", result.stderr)
+        result = self.run_cli("plan", CORNELL, "--effect", "emitters=off", *QUICK)
+        self.assert_exit(result, 3)
+        self.assertIn("light", result.stderr)
+        self.assert_nothing_left()
+
+    def test_a_forced_effect_is_marked(self):
+        effects = {effect["effect"]: effect for effect in self.plan(CORNELL, "--effect", "interreflection=off")["effects"]}
+        self.assertEqual(effects["interreflection"]["state"], "off")
+        self.assertEqual([name for name in effects if effects[name]["is_forced"]], ["interreflection"])
+
+    def test_each_kind_of_bad_sky_image_is_refused_by_name(self):
+        nan, inf = float("nan"), float("inf")
+        for name, content, word in (
+                ("nowhere.hdr", None, "there is no such file"),
+                ("text.hdr", b"no picture", "neither a Radiance .hdr nor an OpenEXR image"),
+                ("square.exr", cli_scenes.exr(2, 2, [(1, 1, 1)] * 4), "2 x 2 pixels"),
+                ("nan.exr", cli_scenes.exr(4, 2, [(1, 1, 1)] * 6 + [(1, nan, 1), (1, 1, 1)]), "nan at pixel (2, 1)"),
+                ("inf.exr", cli_scenes.exr(4, 2, [(inf, 1, 1)] + [(1, 1, 1)] * 7), "inf at pixel (0, 0)"),
+                ("negative.exr", cli_scenes.exr(4, 2, [(1, 1, 1)] * 7 + [(1, 1, -2)]), "-2 at pixel (3, 1)"),
+                ("cut.exr", cli_scenes.exr(4, 2, [(1, 1, 1)] * 8)[:-40], "cut.exr")):
+            with self.subTest(image=name):
+                if content is not None:
+                    self.write(name, content)
+                result = self.run_cli("plan", CORNELL, "--hdri", self.place / name)
+                self.assert_exit(result, 3)
+                self.assertIn(name, result.stderr)
+                self.assertIn(word, result.stderr)
+        self.assert_exit(self.run_cli("plan", CORNELL, "--hdri", "a.hdr", "--sky", "1,1,1"), 2)
+        black = self.write("black.exr", cli_scenes.exr(2, 1, [(0, 0, 0)] * 2))
+        dark = self.run_cli("plan", self.write("dark.gltf", cli_scenes.square(emissive=(0, 0, 0))), "--hdri", black)
+        self.assert_exit(dark, 3)
+        self.assertIn("no light at all", dark.stderr)
+
+    def test_an_even_sky_image_lights_an_open_floor_as_a_sky_does(self):
+        scene = self.write("dark.gltf", cli_scenes.square(emissive=(0, 0, 0)))
+        sky = self.write("even.exr", cli_scenes.exr(64, 32, [(2, 2, 2)] * 2048))
+        # pi x 2 x 50 nit; the sampled rays' share is the noise.
+        report = self.bake(scene, "--hdri", f"{sky}:50")
+        self.assertAlmostEqual(report["energy"]["mean_irradiance"] / 314.159, 1, delta=0.005)
+
+    def test_layers_are_files_that_sum_to_all_light(self):
+        self.bake(CORNELL, "--layers", "ao,direct,indirect", "--ao-distance", "0.3")
+        names = ["lightmap_0.exr", "lightmap_0_direct.exr", "lightmap_0_indirect.exr", "lightmap_0_ao.exr"]
+        self.assertLessEqual(set(names), set(os.listdir(self.place / "out")))
+        light, direct, indirect, openness = (self.covered(name) for name in names)
+        self.assertEqual(len({len(light), len(direct), len(indirect), len(openness)}), 1)
+        brightest = max(max(texel) for texel in light)
+        self.assertGreater(brightest, 0)
+        for all_light, a, b in zip(light, direct, indirect):
+            for c in range(3):
+                # Each is float32, rounded once or twice on its way.
+                self.assertAlmostEqual(all_light[c], a[c] + b[c], delta=1e-6 * brightest)
+        for texel in openness:
+            self.assertEqual(texel[0], texel[1])
+            self.assertTrue(0 <= texel[0] <= 1 + 1e-6)
+        self.assertLess(min(texel[0] for texel in openness), 0.9)  # corners of the room
+        sidecar = json.loads((self.place / "out" / "lightmaps.json").read_text())
+        self.assertEqual([layer["name"] for layer in sidecar["lightmaps"][0]["layers"]],
+                         ["lightmap_0_direct", "lightmap_0_indirect", "lightmap_0_ao"])
+        self.assertEqual([layer["unit"] for layer in sidecar["lightmaps"][0]["layers"]], ["lx", "lx", "1"])
+        # The scene carries all light and nothing else.
+        gltf, _ = cli_scenes.glb_parts((self.place / "out" / "scene.glb").read_bytes())
+        self.assertEqual(len(gltf["images"]), 1)
+
+    def test_layers_change_no_other_map(self):
+        self.bake(CORNELL)
+        alone = (self.place / "out" / "lightmap_0.exr").read_bytes()
+        self.bake(CORNELL, "--layers", "direct,ao")
+        self.assertEqual((self.place / "out" / "lightmap_0.exr").read_bytes(), alone)
+
+    def test_a_report_has_what_was_predicted_beside_what_it_took(self):
+        result = self.run_cli("submit", CORNELL, "-o", self.place / "out", *QUICK)
+        self.assert_exit(result, 0)
+        self.assertRegex(result.stderr, r"took .* of CPU time, predicted .* \(.* to .*\), and .* of memory, predicted ")
+        report = json.loads((self.place / "out" / "report.json").read_text())
+        self.assertEqual(len(report["plan"]["effects"]), 22)
+        self.assertNotIn("prediction", report["plan"])  # equal bakes have equal plans
+        table = report["run"]["predicted_and_actual"]
+        self.assertEqual([row["stage"] for row in table["stages"]], ["preparing", "form_factors", "solving", "gathering"])
+        for row in [*table["stages"], table["total"]]:
+            self.assertGreater(row["predicted_cpu_seconds"], 0)
+            self.assertLessEqual(row["low"], row["predicted_cpu_seconds"])
+            self.assertLessEqual(row["predicted_cpu_seconds"], row["high"])
+            self.assertGreaterEqual(row["actual_cpu_seconds"], 0)
+        self.assertEqual(table["total"]["actual_cpu_seconds"], report["run"]["cpu_seconds"])
+        self.assertEqual(table["memory"]["actual_bytes"], report["run"]["peak_memory_bytes"])
+        self.assertGreater(table["memory"]["predicted_bytes"], 0)
+
+    def test_costs_outlive_a_private_server(self):
+        self.assert_exit(self.run_cli("submit", CORNELL, "-o", self.place / "out", *QUICK), 0)
+        self.assertTrue((self.cache / "radbake" / "costs").is_file())
+        self.assertEqual(self.plan(CORNELL)["prediction"]["source"], "stored")
+        # A folder that cannot be made is no reason to fail.
+        self.assert_exit(self.run_cli("plan", CORNELL, *QUICK, XDG_CACHE_HOME="/proc/nobody/cache"), 0)
+
+
 class SharedServer(CliTest):
     def setUp(self):
         super().setUp()
@@ -408,6 +595,11 @@ class SharedServer(CliTest):
         too_many = self.run_cli("submit", CORNELL, "-o", self.place / "out", "--rays", "4000000000")
         self.assert_exit(too_many, 2)
         self.assertIn("--rays 4000000000", too_many.stderr)
+        self.assertEqual(self.bakes(), [])
+
+    def test_a_plan_and_a_dry_run_queue_nothing(self):
+        self.assert_exit(self.run_cli("plan", CORNELL, *QUICK), 0)
+        self.assert_exit(self.run_cli("submit", CORNELL, "--dry-run", *QUICK), 0)
         self.assertEqual(self.bakes(), [])
 
     def test_each_kind_of_bad_scene_is_refused_by_name_and_the_server_lives(self):

@@ -160,7 +160,7 @@ Result<void> run(const std::string& path, const BakeOptions& options, int runs) 
     const DirectLight direct(surfaces, visibility, kLightSamplesPerTexel);
     const std::vector<Vec3> radiosity(patches.size(), Vec3{1, 1, 1});
     const GatherScene scene{surfaces, visibility, estimator, direct, radiosity, {}, read.scene.sky, 0};
-    gather_lightmap(std::span(&scene, 1), *prepared->atlas, {}, {}, {});
+    gather_lightmap(scene, *prepared->atlas, {}, {}, {});
   });
   return {};
 }

@@ -73,15 +73,21 @@ class Bake {
     const DirectLight direct(surfaces_, prepared_.shadows(), kLightSamplesPerTexel, Environment::Part::kBright);
     const double ao_distance = options_.ao_distance > 0 ? options_.ao_distance : kDefaultAoDistance;
     std::vector<HemisphereEstimator> rows;
-    std::vector<GatherScene> scenes;
-    rows.reserve(static_cast<std::size_t>(num_channels));
     for (int channel = 0; channel < num_channels; ++channel) {
       rows.emplace_back(surfaces_, prepared_.patches, prepared_.visibility->channel(channel),
                         prepared_.plan.rays_per_texel, options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0);
-      scenes.push_back({surfaces_, prepared_.shadows(), rows.back(), direct, radiosity, glow, surfaces_.sky,
-                        options_.seed, outcome_.report.solver.error_bound});
     }
-    if (!gather(scenes)) return cancelled();
+    const GatherScene scene{surfaces_,
+                            prepared_.shadows(),
+                            rows[0],
+                            direct,
+                            radiosity,
+                            glow,
+                            surfaces_.sky,
+                            options_.seed,
+                            std::span(rows).subspan(1),
+                            outcome_.report.solver.error_bound};
+    if (!gather(scene)) return cancelled();
     outcome_.report.stages = progress_.stage_times();
     return std::move(outcome_);
   }
@@ -177,14 +183,14 @@ class Bake {
   }
 
   /// Radiosity -> lightmaps and light by vertex; false when it was stopped.
-  bool gather(std::span<const GatherScene> channels) {
+  bool gather(const GatherScene& scene) {
     const std::uint64_t num_receivers = prepared_.plan.num_texels + prepared_.plan.num_vertex_groups;
     progress_.report(BakeStage::kGathering, 0, num_receivers);
-    if (prepared_.atlas && !gather_texels(channels, *prepared_.atlas, num_receivers)) return false;
+    if (prepared_.atlas && !gather_texels(scene, *prepared_.atlas, num_receivers)) return false;
     GatheredVertices vertices;
     if (prepared_.groups) {
       vertices = gather_vertices(
-          channels, *prepared_.groups,
+          scene, *prepared_.groups,
           [&](std::uint64_t done) {
             progress_.report(BakeStage::kGathering, prepared_.plan.num_texels + done, num_receivers);
           },
@@ -195,10 +201,10 @@ class Bake {
     return true;
   }
 
-  bool gather_texels(std::span<const GatherScene> channels, const Atlas& atlas, std::uint64_t num_receivers) {
+  bool gather_texels(const GatherScene& scene, const Atlas& atlas, std::uint64_t num_receivers) {
     BakeReport& report = outcome_.report;
     GatheredMap map = gather_lightmap(
-        channels, atlas, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
+        scene, atlas, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
         [&](const GatheredTile& tile) {
           progress_.tile({tile.sheet, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba, layer_name(tile.sheet),
                           atlas.width(), atlas.height()});

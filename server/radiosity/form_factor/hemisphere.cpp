@@ -50,15 +50,33 @@ void HemisphereEstimator::deal_rays(std::span<const Site> sites, std::uint64_t s
 
 void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch,
                                      RowSample& row) const {
+  deal_rays(sites, seed, scratch);
+  scratch.hits.resize(scratch.rays.size());
+  visibility_.trace(scratch.rays, scratch.hits);
+  read_off(sites, scratch, scratch.hits, row);
+  row.traced = static_cast<std::uint32_t>(scratch.rays.size());
+}
+
+void HemisphereEstimator::sample_again(std::span<const Site> sites, Scratch& scratch, RowSample& row) const {
+  scratch.hits_again = scratch.hits;
+  scratch.wanted.resize(scratch.hits.size());
+  std::uint32_t traced = 0;
+  for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
+    scratch.wanted[k] = scratch.hits[k].differs_by_channel;
+    traced += scratch.wanted[k];
+  }
+  if (traced > 0) visibility_.trace_again(scratch.rays, scratch.wanted, scratch.hits_again);
+  read_off(sites, scratch, scratch.hits_again, row);
+  row.traced = traced;
+}
+
+void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& scratch, std::span<const Hit> hits,
+                                   RowSample& row) const {
   row = {std::move(row.arrivals),  std::move(row.escapes), 0, 0, 0, 0,
          std::move(row.is_buried), std::move(row.of_site), 1};
   row.escapes.clear();
   row.is_buried.assign(sites.size(), 0);
   row.of_site.assign(sites.size(), {});
-  deal_rays(sites, seed, scratch);
-  scratch.hits.resize(scratch.rays.size());
-  visibility_.trace(scratch.rays, scratch.hits);
-  row.traced = static_cast<std::uint32_t>(scratch.rays.size());
 
   // Read off what each ray met, site by site: a buried site takes its rays back.
   row.arrivals.resize(scratch.rays.size());
@@ -72,9 +90,9 @@ void HemisphereEstimator::sample_row(std::span<const Site> sites, std::uint64_t 
     own.counted = static_cast<std::uint32_t>(scratch.end_of_site[s] - k);
     std::uint32_t absorbed = 0, enclosing = 0;
     for (; k < scratch.end_of_site[s]; ++k) {
-      const Hit& hit = scratch.hits[k];
-      if (k + kAhead < scratch.hits.size() && scratch.hits[k + kAhead].triangle != kNoHit) {
-        patches_.expect(scratch.hits[k + kAhead].triangle);
+      const Hit& hit = hits[k];
+      if (k + kAhead < hits.size() && hits[k + kAhead].triangle != kNoHit) {
+        patches_.expect(hits[k + kAhead].triangle);
       }
       if (hit.triangle == kNoHit) {
         ++own.escaped;

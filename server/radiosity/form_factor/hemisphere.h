@@ -63,12 +63,19 @@ class HemisphereEstimator {
     std::vector<Ray> rays;
     std::vector<Hit> hits;
     std::vector<std::size_t> end_of_site;  ///< into rays
+    std::vector<Hit> hits_again;           ///< of another channel
+    std::vector<std::uint8_t> wanted;
   };
 
   /// Traces one row. Shapes: sites [n], n >= 1.
   void sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, RowSample& row) const;
 
+  /// The same rays as the last sample_row() with this scratch, as this estimator's channel meets them; only those are
+  /// traced that may differ.
+  void sample_again(std::span<const Site> sites, Scratch& scratch, RowSample& row) const;
+
  private:
+  void read_off(std::span<const Site> sites, const Scratch& scratch, std::span<const Hit> hits, RowSample& row) const;
   void deal_rays(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch) const;
 
   const Surfaces& surfaces_;

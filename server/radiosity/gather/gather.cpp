@@ -37,9 +37,8 @@ void put(Vec3 value, double coverage, std::size_t at, std::vector<float>& rgba) 
   rgba[4 * at + 3] = static_cast<float>(coverage);
 }
 
-Texel gather_texel(std::span<const GatherScene> channels, const Atlas& atlas, const SobolPoints& site_points, int x,
-                   int y, Scratch& scratch) {
-  const GatherScene& scene = channels.front();
+Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoints& site_points, int x, int y,
+                   Scratch& scratch) {
   Texel texel;
   atlas.footprint(x, y, scratch.footprint);
   if (scratch.footprint.is_empty()) return texel;
@@ -55,8 +54,8 @@ Texel gather_texel(std::span<const GatherScene> channels, const Atlas& atlas, co
         scratch.footprint.sample(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds));
     scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
   }
-  const Reception reception = receive_channels(channels, seed_of(scene.seed, kRaysOfTexel, id),
-                                               seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
+  const Reception reception =
+      receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
   texel.irradiance = reception.irradiance;
   texel.indirect = reception.indirect;
   texel.openness = reception.openness;
@@ -68,13 +67,13 @@ Texel gather_texel(std::span<const GatherScene> channels, const Atlas& atlas, co
 
 }  // namespace
 
-GatheredMap gather_lightmap(std::span<const GatherScene> channels, const Atlas& atlas, GatherLayers layers,
+GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas, GatherLayers layers,
                             const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop) {
   const int width = atlas.width(), height = atlas.height();
   const int edge = std::max(width, height) > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
   const int tiles_across = (width + edge - 1) / edge, tiles_down = (height + edge - 1) / edge;
   const std::size_t num_texels = static_cast<std::size_t>(atlas.num_rows()) * width;
-  const SobolPoints site_points(channels.front().rows.num_sites());
+  const SobolPoints site_points(scene.rows.num_sites());
 
   GatheredMap map;
   map.rgba.assign(num_texels * 4, 0.0f);
@@ -104,7 +103,7 @@ GatheredMap gather_lightmap(std::span<const GatherScene> channels, const Atlas& 
     for (int y = first_row; y < first_row + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
         if (stop.stop_requested()) return;
-        const Texel texel = gather_texel(channels, atlas, site_points, x, y, scratch);
+        const Texel texel = gather_texel(scene, atlas, site_points, x, y, scratch);
         const std::size_t at = static_cast<std::size_t>(y) * width + x;
         map.states[at] = texel.state;
         put(texel.irradiance, texel.coverage, at, map.rgba);

@@ -39,8 +39,7 @@ struct GatherLayers {
 
 /// Final gather: receive() over the footprint of each texel. A buried texel is invalid. Tiles are reported as they
 /// finish, one call at a time, in any order; the map does not depend on that order.
-/// Shapes: channels, 1: all channels are received together; 3: each as its own scene gives it (coloured sheets).
-GatheredMap gather_lightmap(std::span<const GatherScene> channels, const Atlas& atlas, GatherLayers layers,
+GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas, GatherLayers layers,
                             const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop);
 
 }  // namespace radbake::radiosity

@@ -71,9 +71,8 @@ std::uint64_t fill_buried(const VertexGroups& groups, std::vector<std::uint8_t>&
 
 }  // namespace
 
-GatheredVertices gather_vertices(std::span<const GatherScene> channels, const VertexGroups& groups,
+GatheredVertices gather_vertices(const GatherScene& scene, const VertexGroups& groups,
                                  const std::function<void(std::uint64_t)>& on_done, std::stop_token stop) {
-  const GatherScene& scene = channels.front();
   GatheredVertices out;
   out.irradiance.resize(groups.size());
   std::vector<std::uint8_t> is_known(groups.size(), 0);
@@ -97,8 +96,8 @@ GatheredVertices gather_vertices(std::span<const GatherScene> channels, const Ve
                                            site_points.coordinate(s, 1, seeds));
         scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
       }
-      const Reception reception = receive_channels(channels, seed_of(scene.seed, kRaysOfVertex, g),
-                                                   seed_of(scene.seed, kLightOfVertex, g), scratch.receive);
+      const Reception reception = receive(scene, seed_of(scene.seed, kRaysOfVertex, g),
+                                          seed_of(scene.seed, kLightOfVertex, g), scratch.receive);
       out.irradiance[g] = reception.irradiance;
       is_known[g] = !reception.is_buried;
       num_rays += reception.rays;

@@ -23,8 +23,8 @@ struct GatheredVertices {
 
 /// Final gather: receive() over the quarter of each incident triangle that lies next to the vertex.
 ///
-/// Shapes: channels as of gather_lightmap(). on_done is called from any thread with the number of groups done.
-GatheredVertices gather_vertices(std::span<const GatherScene> channels, const VertexGroups& groups,
+/// on_done is called from any thread with the number of groups done.
+GatheredVertices gather_vertices(const GatherScene& scene, const VertexGroups& groups,
                                  const std::function<void(std::uint64_t)>& on_done, std::stop_token stop);
 
 }  // namespace radbake::radiosity

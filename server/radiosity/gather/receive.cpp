@@ -128,22 +128,21 @@ struct Light {
   double openness = 0;
 };
 
-/// The light at the sites that are not out, from the row that was traced for them.
-Light light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
-  // Gather what the patches send, and the sky.
+/// What the patches and the sky send along the rays of a row, from the sites that are not out.
+Light light_of_row(const GatherScene& scene, const RowSample& row, const ReceiveScratch& scratch) {
   Vec3 sum, glow, sky;
   std::uint64_t escaped = 0, counted = 0, near = 0;
   const Environment* environment = scene.direct.environment();
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
     if (scratch.is_out[s]) continue;
-    const RowSample::SiteRays& own = scratch.row.of_site[s];
+    const RowSample::SiteRays& own = row.of_site[s];
     for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
-      const std::uint32_t patch = scratch.row.arrivals[own.first_arrival + k];
+      const std::uint32_t patch = row.arrivals[own.first_arrival + k];
       sum += scene.radiosity[patch];
       if (!scene.glow.empty()) glow += scene.glow[patch];
     }
     for (std::uint32_t k = 0; k < own.escaped && environment != nullptr; ++k) {
-      const auto& d = scratch.hemisphere.rays[scratch.row.escapes[own.first_escape + k]].direction;
+      const auto& d = scratch.hemisphere.rays[row.escapes[own.first_escape + k]].direction;
       sky += environment->dim_luminance({d[0], d[1], d[2]});
     }
     escaped += own.escaped;
@@ -153,12 +152,28 @@ Light light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratc
   if (counted == 0) return {};
   const auto num = static_cast<double>(counted);
   sky += scene.sky * static_cast<double>(escaped);
+  return {(sum + sky * std::numbers::pi) / num, (sum - glow) / num, 1 - static_cast<double>(near) / num};
+}
+
+/// The light at the sites that are not out, from the row that was traced for them. Of channels with rows of their own,
+/// the first says what counts.
+Light light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+  Light light = light_of_row(scene, scratch.row, scratch);
+  for (std::size_t c = 0; c < scene.other_rows.size(); ++c) {
+    scene.other_rows[c].sample_again(scratch.sites, scratch.hemisphere, scratch.other_row);
+    out.rays += scratch.other_row.traced;
+    const Light other = light_of_row(scene, scratch.other_row, scratch);
+    const int channel = static_cast<int>(c) + 1;
+    light.all[channel] = other.all[channel];
+    light.indirect[channel] = other.indirect[channel];
+  }
 
   // Add what the lights send straight.
   Vec3 direct;
   out.light_rays +=
       scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light, std::span(&direct, 1));
-  return {(sum + sky * std::numbers::pi) / num + direct, (sum - glow) / num, 1 - static_cast<double>(near) / num};
+  light.all += direct;
+  return light;
 }
 
 /// Leaves all parts out but the darkest of those that are large enough to be measured.
@@ -223,26 +238,6 @@ Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64
   out.indirect = light.indirect;
   out.openness = light.openness;
   out.is_buried = false;
-  return out;
-}
-
-Reception receive_channels(std::span<const GatherScene> channels, std::uint64_t rays_seed, std::uint64_t light_seed,
-                           ReceiveScratch& scratch) {
-  if (channels.size() == 1) return receive(channels.front(), rays_seed, light_seed, scratch);
-  Reception out;
-  out.is_buried = false;
-  const std::vector<Site> sites = scratch.sites;  // receive() may change them
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    scratch.sites = sites;
-    const Reception own = receive(channels[c], rays_seed, light_seed, scratch);
-    const int channel = static_cast<int>(c);
-    out.irradiance[channel] = own.irradiance[channel];
-    out.indirect[channel] = own.indirect[channel];
-    out.openness += own.openness / static_cast<double>(channels.size());
-    out.is_buried |= own.is_buried;
-    out.rays += own.rays;
-    out.light_rays += own.light_rays;
-  }
   return out;
 }
 

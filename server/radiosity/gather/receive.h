@@ -20,6 +20,8 @@ struct GatherScene {
   std::span<const Vec3> glow;       ///< [patches] E_in, the part of B' that is not reflected
   Vec3 sky;                         ///< luminance, nit
   std::uint64_t seed = 0;
+  /// Of channels 1 and 2, where they have rows of their own; `rows` is channel 0's then.
+  std::span<const HemisphereEstimator> other_rows = {};
   double dark = 0;  ///< radiosity up to this is none: what the solver cannot tell from 0, lx
 };
 
@@ -38,6 +40,7 @@ struct ReceiveScratch {
   HemisphereEstimator::Scratch hemisphere;
   DirectLight::Scratch light;
   RowSample row;
+  RowSample other_row;
   std::vector<Ray> segments;
   std::vector<std::uint8_t> is_blocked;
   std::vector<std::uint8_t> is_out;
@@ -55,10 +58,5 @@ struct ReceiveScratch {
 /// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
 /// of a wall, or a mean of both, would be a leak. `rays_seed`, `light_seed`: what the receiver is.
 Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch);
-
-/// As receive() where all channels are received together; each by a scene of its own where there are three.
-/// A receiver is buried where it is in any channel.
-Reception receive_channels(std::span<const GatherScene> channels, std::uint64_t rays_seed, std::uint64_t light_seed,
-                           ReceiveScratch& scratch);
 
 }  // namespace radbake::radiosity

@@ -24,10 +24,13 @@ class BruteForceVisibility final : public Visibility {
     const Chances chances(rays);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       hits[i] = {};
+      bool differs = false;
       for (const Hit& hit : crossings(rays[i])) {
-        const bool is_nearer = hit.distance < hits[i].distance;
-        if (is_nearer && chances.of(i, hit.triangle) < opacity_of(hit)[channel_]) hits[i] = hit;
+        const Vec3 opacity = opacity_of(hit);
+        differs = differs || opacity.x != opacity.y || opacity.y != opacity.z;
+        if (hit.distance < hits[i].distance && chances.of(i, hit.triangle) < opacity[channel_]) hits[i] = hit;
       }
+      hits[i].differs_by_channel = differs;
     }
   }
 

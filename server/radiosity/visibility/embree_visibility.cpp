@@ -131,20 +131,22 @@ struct PacketContext {
   const Tree* tree;
   int channel;
   Chances chances;
-  std::size_t first;  ///< ray of the batch that is the packet's first
+  std::array<std::uint32_t, kPacket> rays;  ///< of the batch, by RTCRayN_id
+  std::array<bool, kPacket> differs;        ///< by RTCRayN_id: met what stops channels by different shares
   Vec3* transmitted;  ///< [kPacket] by RTCRayN_id; null: whether anything stands there is all that is asked
 };
 
 /// Lets a ray through with the probability 1 - opacity.
 void Tree::pass_or_stop(const RTCFilterFunctionNArguments* args) {
-  const auto& context = *reinterpret_cast<const PacketContext*>(args->context);
+  auto& context = *reinterpret_cast<PacketContext*>(args->context);
   for (unsigned k = 0; k < args->N; ++k) {
     if (args->valid[k] != -1) continue;
     const std::uint32_t triangle = context.tree->triangle(kSeeThrough, RTCHitN_primID(args->hit, args->N, k));
     const Vec3 opacity =
         context.tree->opacity_->opacity(triangle, RTCHitN_u(args->hit, args->N, k), RTCHitN_v(args->hit, args->N, k));
-    const std::size_t ray = context.first + RTCRayN_id(args->ray, args->N, k);
-    if (context.chances.of(ray, triangle) >= opacity[context.channel]) args->valid[k] = 0;
+    const unsigned lane = RTCRayN_id(args->ray, args->N, k);
+    if (opacity.x != opacity.y || opacity.y != opacity.z) context.differs[lane] = true;
+    if (context.chances.of(context.rays[lane], triangle) >= opacity[context.channel]) args->valid[k] = 0;
   }
 }
 
@@ -178,28 +180,20 @@ class EmbreeVisibility final : public Visibility {
 
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const override {
     RADBAKE_CHECK_EQ(rays.size(), hits.size());
-    PacketContext context = make_context(rays, nullptr);
-    alignas(64) int valid[kPacket];
-    RTCRayHit16 packet;
-    set_constants(packet.ray);
-    for (std::size_t first = 0; first < rays.size(); first += kPacket) {
-      context.first = first;
-      const int count = static_cast<int>(std::min<std::size_t>(kPacket, rays.size() - first));
-      for (int k = 0; k < kPacket; ++k) {
-        valid[k] = k < count ? -1 : 0;
-        set_lane(packet.ray, k, rays[first + std::min(k, count - 1)]);
-        packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
-        packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
-      }
-      rtcIntersect16(valid, tree_->scene(), &context.base, &packet);
-      for (int k = 0; k < count; ++k) {
-        const unsigned geometry = packet.hit.geomID[k];
-        hits[first + k] = geometry != RTC_INVALID_GEOMETRY_ID
-                              ? Hit{tree_->triangle(geometry, packet.hit.primID[k]), packet.hit.u[k], packet.hit.v[k],
-                                    packet.ray.tfar[k]}
-                              : Hit{};
-      }
+    Tracer tracer(*this, rays, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) tracer.add(i);
+    tracer.flush();
+  }
+
+  void trace_again(std::span<const Ray> rays, std::span<const std::uint8_t> wanted,
+                   std::span<Hit> hits) const override {
+    RADBAKE_CHECK_EQ(rays.size(), hits.size());
+    RADBAKE_CHECK_EQ(rays.size(), wanted.size());
+    Tracer tracer(*this, rays, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (wanted[i]) tracer.add(i);
     }
+    tracer.flush();
   }
 
   void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const override {
@@ -271,6 +265,53 @@ class EmbreeVisibility final : public Visibility {
   }
 
  private:
+  /// Rays of a batch, packet by packet.
+  class Tracer {
+   public:
+    Tracer(const EmbreeVisibility& visibility, std::span<const Ray> rays, std::span<Hit> hits)
+        : tree_(*visibility.tree_), context_(visibility.make_context(rays, nullptr)), rays_(rays), hits_(hits) {
+      set_constants(packet_.ray);
+    }
+
+    void add(std::size_t ray) {
+      context_.rays[count_] = static_cast<std::uint32_t>(ray);
+      set_lane(packet_.ray, count_, rays_[ray]);
+      if (++count_ == kPacket) flush();
+    }
+
+    void flush() {
+      if (count_ == 0) return;
+      alignas(64) int valid[kPacket];
+      for (int k = 0; k < kPacket; ++k) {
+        valid[k] = k < count_ ? -1 : 0;
+        if (k >= count_) set_lane(packet_.ray, k, rays_[context_.rays[0]]);
+        packet_.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+        packet_.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+      }
+      context_.differs.fill(false);
+      rtcIntersect16(valid, tree_.scene(), &context_.base, &packet_);
+      for (int k = 0; k < count_; ++k) {
+        Hit& hit = hits_[context_.rays[k]];
+        const unsigned geometry = packet_.hit.geomID[k];
+        hit = {};
+        if (geometry != RTC_INVALID_GEOMETRY_ID) {
+          hit = {tree_.triangle(geometry, packet_.hit.primID[k]), packet_.hit.u[k], packet_.hit.v[k],
+                 packet_.ray.tfar[k]};
+        }
+        hit.differs_by_channel = context_.differs[k];
+      }
+      count_ = 0;
+    }
+
+   private:
+    const Tree& tree_;
+    PacketContext context_;
+    std::span<const Ray> rays_;
+    std::span<Hit> hits_;
+    RTCRayHit16 packet_;
+    int count_ = 0;
+  };
+
   struct Near {
     const Tree& tree;
     std::vector<std::uint32_t>& triangles;
@@ -282,7 +323,7 @@ class EmbreeVisibility final : public Visibility {
   };
 
   PacketContext make_context(std::span<const Ray> batch, Vec3* transmitted) const {
-    PacketContext context{{}, tree_.get(), channel_, Chances(batch), 0, transmitted};
+    PacketContext context{{}, tree_.get(), channel_, Chances(batch), {}, {}, transmitted};
     rtcInitIntersectContext(&context.base);
     return context;
   }

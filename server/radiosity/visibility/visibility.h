@@ -29,6 +29,8 @@ struct Hit {
   float u = 0;
   float v = 0;
   float distance = std::numeric_limits<float>::infinity();  ///< in lengths of the ray's direction
+  /// The ray met something on its way that stops channels by different shares: they may end elsewhere.
+  bool differs_by_channel = false;
 };
 
 /// How much of a surface stands in the way of light, where that is not all of it: holes, partial coverage, tinted
@@ -72,6 +74,16 @@ class Visibility {
   /// Of what is see-through, a ray is stopped with the probability of its opacity in this channel, as Chances says: the
   /// shares of the rays of a batch are right, and channels of equal opacity agree.
   virtual void trace(std::span<const Ray> rays, std::span<Hit> hits) const = 0;
+
+  /// As trace(), of those rays alone that are wanted: the others' hits stay as they are.
+  /// Shapes: rays, wanted, hits [n]; wanted 0 or 1.
+  virtual void trace_again(std::span<const Ray> rays, std::span<const std::uint8_t> wanted, std::span<Hit> hits) const {
+    std::vector<Hit> all(rays.size());
+    trace(rays, all);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (wanted[i]) hits[i] = all[i];
+    }
+  }
 
   /// Whether anything lies on each segment, be it see-through in part. Shapes: segments [n], blocked [n], 0 or 1.
   virtual void blocked(std::span<const Ray> segments, std::span<std::uint8_t> blocked) const = 0;

@@ -1,20 +1,14 @@
-// Effects: a plan turns on exactly what is there. Forced on, what it turned off changes nothing; forced off, what it
-// turned on changes the map.
+// What a plan turned off changes nothing where it is forced on; what it turned on changes the map where it is forced
+// off. That plans turn on what is there: effects_planned_test.cpp.
 #include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 
 #include "tests/invariant/bake_support.h"
 #include "tests/invariant/seed_maps.h"
+#include "tests/invariant/seed_statistics.h"
 #include "tests/scenes/effect_rooms.h"
 
 namespace radbake::tests {
 namespace {
-
-using radiosity::Effect;
-using radiosity::EffectPlan;
-using radiosity::EffectState;
 
 radiosity::BakeOptions quick_options() {
   radiosity::BakeOptions options;
@@ -29,63 +23,36 @@ radiosity::BakeOptions forced(const std::string& effect, bool is_on) {
   return options;
 }
 
-std::vector<EffectPlan> planned(const Scene& scene) {
-  const auto plan = radiosity::plan_scene(scene, quick_options());
-  EXPECT_TRUE(plan.ok()) << plan.error().message;
-  return plan.ok() ? plan.value().plan.effects : std::vector<EffectPlan>{};
-}
-
-std::vector<std::string> effects_in(const std::vector<EffectPlan>& plan, EffectState state) {
-  std::vector<std::string> names;
-  for (const EffectPlan& effect : plan) {
-    if (effect.state == state) names.emplace_back(effect_name(effect.effect));
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-std::vector<std::string> sorted(std::vector<std::string> names) {
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-/// What is compared: a false alarm takes a value 6 standard errors off, 2e-9 if all is noise; a map has about 6,000
-/// values, and there are about 60 comparisons: 7e-4 for the whole test.
-constexpr double kNothingBut = 6;
-/// What the largest of 6,000 differences of noise reaches once in 600 maps.
-constexpr double kSurely = 5;
+/// In standard errors of a texel from 8 seeds. Of a map's 3,000 values the largest reaches 5 by noise alone once in 500
+/// comparisons; the least that an effect of these rooms changes is 7 (`two_sided`), most change more than 30.
+constexpr double kMoreThanNoise = 5;
 
 class Effects : public testing::TestWithParam<EffectRoom> {};
 
-TEST_P(Effects, AreOnExactlyWhereTheyAreThere) {
-  const std::vector<EffectPlan> plan = planned(GetParam().scene);
-  ASSERT_EQ(plan.size(), static_cast<std::size_t>(radiosity::kNumEffects));
-  EXPECT_EQ(effects_in(plan, EffectState::kOn), sorted(GetParam().on));
-  EXPECT_EQ(effects_in(plan, EffectState::kOff), sorted(GetParam().off));
-  for (const EffectPlan& effect : plan) EXPECT_FALSE(effect.reason.empty()) << effect_name(effect.effect);
-}
-
-TEST_P(Effects, ChangeNothingWhereThePlanTurnedThemOff) {
+TEST_P(Effects, ChangeNoBitWhereThePlanTurnedThemOff) {
+  // No light that may be found by chance is at stake, so that nothing is left to the sampling error.
   const Scene& scene = GetParam().scene;
-  const SeedMaps as_planned = maps_of_seeds(scene, quick_options());
-  for (const std::string& effect : effects_in(planned(scene), EffectState::kOff)) {
-    SCOPED_TRACE(effect);
-    const SeedMaps with = maps_of_seeds(scene, forced(effect, true));
-    EXPECT_EQ(with.values, as_planned.values);
-    EXPECT_LT(largest_difference(as_planned, with), kNothingBut);
+  const SeedMaps as_planned = maps_of_seeds(scene, quick_options(), 2);
+  for (const std::string& effect : GetParam().off) {
+    const SeedMaps with = maps_of_seeds(scene, forced(effect, true), 2);
+    EXPECT_TRUE(with.values == as_planned.values)
+        << effect << ": differs by up to " << largest_change(with, as_planned);
   }
 }
 
 TEST_P(Effects, ChangeTheMapWhereThePlanTurnedThemOn) {
   const Scene& scene = GetParam().scene;
-  const SeedMaps as_planned = maps_of_seeds(scene, quick_options());
-  const std::vector<std::string> on = effects_in(planned(scene), EffectState::kOn);
-  for (const std::string& effect : on) {
-    SCOPED_TRACE(effect);
-    const SeedMaps without = maps_of_seeds(scene, forced(effect, false));
-    const double d = largest_difference(as_planned, without);
-    std::printf("on %s %s %g\n", GetParam().name.c_str(), effect.c_str(), d);
-    EXPECT_GT(d, kSurely);
+  const SeedMaps as_planned = maps_of_seeds(scene, quick_options(), kSeeds);
+  for (const std::string& effect : GetParam().on) {
+    const auto without = radiosity::plan_scene(scene, forced(effect, false));
+    if (!without.ok()) {
+      // It is the only light.
+      EXPECT_NE(without.error().message.find("no light is left"), std::string::npos) << without.error().message;
+      continue;
+    }
+    const double change = largest_difference(as_planned, maps_of_seeds(scene, forced(effect, false), kSeeds));
+    EXPECT_GT(change, kMoreThanNoise) << effect;
+    RecordProperty(effect, std::to_string(change));
   }
 }
 

@@ -21,7 +21,7 @@ struct Moments {
       for (const std::vector<float>& map : maps.values) values.push_back(map[k]);
       const Seeded known = seeded(values);
       means[k] = known.mean;
-      variances[k] = known.standard_error * known.standard_error * kSeeds;
+      variances[k] = known.standard_error * known.standard_error * static_cast<double>(values.size());
     }
   }
 };
@@ -37,9 +37,9 @@ std::vector<bool> covered_in(const SeedMaps& maps) {
 
 }  // namespace
 
-SeedMaps maps_of_seeds(const Scene& scene, radiosity::BakeOptions options) {
+SeedMaps maps_of_seeds(const Scene& scene, radiosity::BakeOptions options, int num_seeds) {
   SeedMaps maps;
-  for (int seed = 1; seed <= kSeeds; ++seed) {
+  for (int seed = 1; seed <= num_seeds; ++seed) {
     options.seed = static_cast<std::uint64_t>(seed);
     const radiosity::BakeOutcome outcome = baked(scene, options);
     const radiosity::Layer& layer = outcome.layers.at(0);
@@ -50,9 +50,23 @@ SeedMaps maps_of_seeds(const Scene& scene, radiosity::BakeOptions options) {
   return maps;
 }
 
+double largest_change(const SeedMaps& a, const SeedMaps& b) {
+  RADBAKE_CHECK_EQ(a.values.size(), b.values.size());
+  double largest = 0;
+  for (std::size_t seed = 0; seed < a.values.size(); ++seed) {
+    RADBAKE_CHECK_EQ(a.values[seed].size(), b.values[seed].size());
+    for (std::size_t k = 0; k < a.values[seed].size(); ++k) {
+      largest = std::max<double>(largest, std::fabs(a.values[seed][k] - b.values[seed][k]));
+    }
+  }
+  return largest;
+}
+
 double largest_difference(const SeedMaps& a, const SeedMaps& b) {
   RADBAKE_CHECK_EQ(a.width, b.width);
   RADBAKE_CHECK_EQ(a.height, b.height);
+  RADBAKE_CHECK_EQ(a.values.size(), b.values.size());
+  const auto num_seeds = static_cast<double>(a.values.size());
   const Moments of_a(a), of_b(b);
   std::vector<bool> is_covered = covered_in(a);
   const std::vector<bool> in_b = covered_in(b);
@@ -76,7 +90,7 @@ double largest_difference(const SeedMaps& a, const SeedMaps& b) {
         const std::size_t k = 4 * at(x, y) + c;
         const double rounding =
             std::numeric_limits<float>::epsilon() * std::max(std::fabs(of_a.means[k]), std::fabs(of_b.means[k]));
-        const double error = std::sqrt(variance / count / kSeeds + rounding * rounding);
+        const double error = std::sqrt(variance / count / num_seeds + rounding * rounding);
         const double difference = std::fabs(of_a.means[k] - of_b.means[k]);
         if (difference > 0) largest = std::max(largest, difference / error);
       }

@@ -5,18 +5,20 @@
 #include <numbers>
 
 #include "tests/scenes/rooms.h"
+#include "tests/scenes/solids.h"
 
 namespace radbake::tests {
 namespace {
 
 constexpr double kEdge = 2;  // of a room, m
+constexpr int kCells = 5;    // of the atlas, along a side: small charts, quick bakes
 constexpr Vec3 kWhite{1, 1, 1};
-constexpr Vec3 kMiddle{1, 1, 1};
+constexpr Vec3 kMiddle{kEdge / 2, kEdge / 2, kEdge / 2};
 constexpr Vec3 kDown{0, -1, 0};
 
 Vec3 grey(double value) { return kWhite * value; }
 
-/// A room of quads, built part by part. Charts are those of RoomBuilder(3): at most nine quads.
+/// A room of quads, built part by part.
 class Room {
  public:
   Room() : walls_(builder_.add_material("walls", grey(0.5))) {}
@@ -98,7 +100,7 @@ class Room {
   }
 
  private:
-  RoomBuilder builder_{3};
+  RoomBuilder builder_{kCells};
   int walls_;
 };
 
@@ -148,6 +150,25 @@ int add_glass(Room& room, Vec3 transmittance) {
   return glass;
 }
 
+/// Turns quads, point lights and spots about two axes by odd angles.
+void turn(Scene& scene) {
+  const double a = 0.37, b = 0.81;
+  const auto turned = [&](Vec3 v) {
+    v = {v.x * std::cos(a) - v.y * std::sin(a), v.x * std::sin(a) + v.y * std::cos(a), v.z};
+    return Vec3{v.x, v.y * std::cos(b) - v.z * std::sin(b), v.y * std::sin(b) + v.z * std::cos(b)};
+  };
+  for (Mesh& mesh : scene.meshes) {
+    for (Vec3& position : mesh.positions) position = turned(position);
+  }
+  for (Light& light : scene.lights) {
+    if (auto* point = std::get_if<PointLight>(&light.kind)) point->position = turned(point->position);
+    if (auto* spot = std::get_if<SpotLight>(&light.kind)) {
+      spot->position = turned(spot->position);
+      spot->direction = turned(spot->direction);
+    }
+  }
+}
+
 /// Nine quads and every light there is.
 Scene everything(bool has_environment) {
   Room room;
@@ -192,7 +213,7 @@ EffectRoom empty_room() {
 }
 
 EffectRoom room_with_block() {
-  RoomBuilder builder(4);
+  RoomBuilder builder(kCells);
   const int walls = builder.add_material("walls", grey(0.5));
   builder.add_box("room", {0, 0, 0}, {kEdge, kEdge, kEdge}, walls, true);
   builder.add_box("block", {0.3, 0.3, 0.3}, {0.8, 0.8, 0.8}, walls, false);
@@ -462,6 +483,34 @@ std::vector<EffectRoom> rooms_without_effects() {
     own.closed();
     own.lamp();
     rooms.push_back(room("double_sided_walls", own, {"point", "interreflection"}, {"occlusion", "color", "two_sided"}));
+  }
+  {
+    // Light straight down, along the walls.
+    Room own;
+    own.pit();
+    own.lamp();
+    own.parallel(kDown, 1);
+    rooms.push_back(room("lit_from_above", own, {"point", "directional", "interreflection"}, {"occlusion", "color"}));
+  }
+  {
+    // No wall lies in a plane of the axes: rounding is in every plane.
+    Room own;
+    own.closed();
+    own.lamp();
+    own.spot(2);
+    turn(own.scene());
+    rooms.push_back(room("turned", own, {"point", "spot", "interreflection"}, {"occlusion", "color"}));
+  }
+  {
+    // A sphere seen from inside: each facet sees its neighbours at a grazing angle.
+    EffectRoom own{"sphere", {}, {"point", "interreflection"}, {"occlusion", "color"}};
+    Mesh sphere = make_sphere(6);
+    for (auto& triangle : sphere.triangles) std::swap(triangle[1], triangle[2]);
+    for (Vec3& normal : sphere.normals) normal = -normal;
+    own.scene.meshes = {sphere};
+    own.scene.materials.resize(1);
+    own.scene.lights = {{"lamp", PointLight{{0.3, 0.2, 0.1}, grey(1)}}};
+    rooms.push_back(own);
   }
   {
     // A tinted sheet and a mask with a hole, with nothing behind that could be lit.

@@ -32,6 +32,13 @@ ScenePlanes find_scene_planes(const Surfaces& surfaces);
 /// Whether every edge is shared by two triangles, by position.
 bool is_watertight(const Surfaces& surfaces);
 
+/// Whether a material stops all light though it is masked or blended, bilinear values between texels included.
+/// Shapes: least_opacity of its reflectance texture, 1 without one.
+inline bool is_opaque_in_fact(const Material& material, double least_opacity) {
+  const double least = material.alpha * least_opacity;
+  return material.alpha_mode == AlphaMode::kMask ? least >= material.alpha_cutoff : least >= 1;
+}
+
 /// Fills in what materials, textures and vertex colours tell. Everything is simulated in `surfaces`.
 void find_material_facts(const Surfaces& surfaces, Survey& survey);
 

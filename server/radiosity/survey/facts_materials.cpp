@@ -34,12 +34,6 @@ Range range_of(const TexturePlane& texture) {
 /// Whether factor times texture is of one value: channels whose factor is zero do not count.
 bool is_flat(Vec3 factor, const Range& range) { return scaled_by(factor, range.low) == scaled_by(factor, range.high); }
 
-/// Whether no texel lets light pass, bilinear values between texels included.
-bool is_opaque_in_fact(const Material& material, const Range& base) {
-  const double least = material.alpha * base.alpha_low;
-  return material.alpha_mode == AlphaMode::kMask ? least >= material.alpha_cutoff : least >= 1;
-}
-
 class MaterialFacts {
  public:
   MaterialFacts(const Surfaces& surfaces, Survey& survey) : scene_(*surfaces.scene), survey_(survey) {
@@ -65,7 +59,7 @@ class MaterialFacts {
     std::vector<bool> passes;
     for (const Material& material : scene_.materials) {
       passes.push_back(material.alpha_mode != AlphaMode::kOpaque &&
-                       !is_opaque_in_fact(material, range_of_use(material.reflectance_texture)));
+                       !is_opaque_in_fact(material, range_of_use(material.reflectance_texture).alpha_low));
     }
     return passes;
   }
@@ -128,7 +122,7 @@ class MaterialFacts {
         max_component(scaled_by(material.emissive, range_of_use(material.emissive_texture).high)) <= 0;
     if (material.alpha_mode == AlphaMode::kOpaque) return;
     ++survey_.num_alpha_materials;
-    survey_.num_alpha_opaque += is_opaque_in_fact(material, range_of_use(material.reflectance_texture));
+    survey_.num_alpha_opaque += is_opaque_in_fact(material, range_of_use(material.reflectance_texture).alpha_low);
   }
 
   const Scene& scene_;

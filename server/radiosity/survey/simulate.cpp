@@ -1,8 +1,10 @@
 #include <algorithm>
 
 #include "common/base/sequence.h"
+#include "server/radiosity/survey/facts.h"
 #include "server/radiosity/survey/surfaces.h"
 #include "server/radiosity/survey/survey.h"
+#include "server/radiosity/survey/texture.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -37,6 +39,13 @@ bool is_simulated(const Light& light, const EffectSet& set) {
                                                                                      : Effect::kDirectional);
 }
 
+/// What is opaque in fact is simulated as that, whatever else is masked.
+bool stops_all(const Material& material, const Scene& scene) {
+  const auto& texture = material.reflectance_texture;
+  return material.alpha_mode != AlphaMode::kOpaque &&
+         is_opaque_in_fact(material, texture ? least_opacity(scene.textures[texture->texture]) : 1);
+}
+
 }  // namespace
 
 void Surfaces::simulate(const EffectSet& set) {
@@ -44,7 +53,7 @@ void Surfaces::simulate(const EffectSet& set) {
   materials = scene->materials;
   for (Material& material : materials) {
     if (!set.has(Effect::kEmitters)) material.emissive = {};
-    if (!set.has(Effect::kAlphaMask)) material.alpha_mode = AlphaMode::kOpaque;
+    if (!set.has(Effect::kAlphaMask) || stops_all(material, *scene)) material.alpha_mode = AlphaMode::kOpaque;
     if (!set.has(Effect::kTint)) material.transmittance = {};
     if (!set.has(Effect::kTwoSided)) material.is_double_sided = false;
   }

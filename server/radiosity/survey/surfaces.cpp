@@ -26,6 +26,16 @@ Vec3 textured(const Surfaces& surfaces, const SurfacePoint& p, Vec3 factor,
                                            texture_coordinate(surfaces, p, *reference)));
 }
 
+/// Mean of the channels in each; (x, x, x) stays itself, to the last bit.
+Vec3 in_grey(Vec3 v) { return Vec3{1, 1, 1} * (v.x + ((v.y - v.x) + (v.z - v.x)) / 3); }
+
+/// What a sheet passes there: where no colour is simulated, one share for all channels, as they share their rays.
+Vec3 passed_share(const Surfaces& surfaces, const SurfacePoint& p) {
+  const Material& own = surfaces.material(p.triangle);
+  const Vec3 passed = textured(surfaces, p, own.transmittance, own.reflectance_texture);
+  return surfaces.effects.has(Effect::kColor) ? passed : in_grey(passed);
+}
+
 }  // namespace
 
 Vec3 Surfaces::shading_normal(const SurfacePoint& p) const {
@@ -52,7 +62,9 @@ Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
   const std::vector<Vec3>& colors = mesh(p.triangle).colors;
   if (!colors.empty()) reflectance = scaled_by(reflectance, interpolated(colors, vertices(p.triangle), p));
   if (max_component(own.transmittance) <= 0) return reflectance;
-  const Vec3 passed = textured(*this, p, own.transmittance, own.reflectance_texture);
+  const Vec3 passed = passed_share(*this, p);
+  // By channel reflectance + passed <= 1: so are their means.
+  if (!effects.has(Effect::kColor)) reflectance = in_grey(reflectance);
   for (int c = 0; c < 3; ++c) reflectance[c] = passed[c] < 1 ? reflectance[c] / (1 - passed[c]) : 0;
   return reflectance;
 }
@@ -70,10 +82,11 @@ Vec3 Surfaces::opacity(const SurfacePoint& p) const {
         own.alpha_mode == AlphaMode::kMask ? (coverage >= own.alpha_cutoff ? 1.0 : 0.0) : std::min(coverage, 1.0);
   }
   if (max_component(own.transmittance) <= 0) return Vec3{1, 1, 1} * coverage;
-  return (Vec3{1, 1, 1} - textured(*this, p, own.transmittance, own.reflectance_texture)) * coverage;
+  return (Vec3{1, 1, 1} - passed_share(*this, p)) * coverage;
 }
 
 bool Surfaces::has_coloured_tint() const {
+  if (!effects.has(Effect::kColor)) return false;
   const auto is_grey = [](Vec3 v) { return v.x == v.y && v.y == v.z; };
   std::vector<std::uint8_t> is_used(materials.size(), 0);
   for (const Mesh& mesh : scene->meshes) is_used[mesh.material] = 1;

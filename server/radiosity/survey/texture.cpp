@@ -48,4 +48,11 @@ double sampled_opacity(const TexturePlane& texture, Vec2 uv) {
   return between_texels(texture, uv, [](const float* value) { return static_cast<double>(value[3]); });
 }
 
+double least_opacity(const TexturePlane& texture) {
+  if (texture.channels < 4 || texture.values.empty()) return 1;
+  double least = texture.values[3];
+  for (std::size_t at = 3; at < texture.values.size(); at += 4) least = std::min<double>(least, texture.values[at]);
+  return least;
+}
+
 }  // namespace radbake::radiosity

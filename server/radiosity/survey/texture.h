@@ -11,4 +11,7 @@ Vec3 sampled_texture(const TexturePlane& texture, Vec2 uv);
 /// Its fourth channel, in the same way; 1 where it has none.
 double sampled_opacity(const TexturePlane& texture, Vec2 uv);
 
+/// The least of its texels' fourth channel; 1 without one.
+double least_opacity(const TexturePlane& texture);
+
 }  // namespace radbake::radiosity

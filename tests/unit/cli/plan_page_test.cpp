@@ -122,8 +122,9 @@ TEST(PlanPage, ShowsMethodsPredictionsAndWarnings) {
   const std::string page = plan_page(room_plan(), "room.glb", {{"limited", "white was limited"}});
   EXPECT_THAT(page, HasSubstr("form factors      hemisphere: many patches\n"));
   EXPECT_THAT(page, HasSubstr("2 of 512 x 256: 100,000 texels"));
-  EXPECT_THAT(lines_with(page, "200 MB"),
-              testing::ElementsAre("  form factors      3.4 s         2.0 s to 5.0 s                1.7 s         200 MB"));
+  EXPECT_THAT(
+      lines_with(page, "200 MB"),
+      testing::ElementsAre("  form factors      3.4 s         2.0 s to 5.0 s                1.7 s         200 MB"));
   EXPECT_THAT(page, HasSubstr("from a pilot of 0.25 s"));
   EXPECT_THAT(page, HasSubstr("6.0 s       floor/tiles#0 (60,000 texels, 1 patch)"));
   EXPECT_THAT(page, HasSubstr("\nWarnings\n  white was limited\n  texels are coarse\n"));

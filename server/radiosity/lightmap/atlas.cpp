@@ -12,6 +12,30 @@ namespace {
 /// Triangles that cover less of a texel than this meet it by rounding only.
 constexpr double kNegligibleCoverage = 1e-6;
 
+/// Calls visit(x, least, most) for the columns of texels that a strip one texel high meets, with bounds on the area
+/// that it has in them. Columns that it reaches into are measured. Those that it passes right through are not: the
+/// height of a convex polygon is a concave function of x, so with an area A and a width W it has at least A / (4 W^2)
+/// there.
+template <typename Visit>
+void for_each_column(const PlanePolygon& strip, double area, int width, const Visit& visit) {
+  double low = strip.corners[0].x, high = low;
+  for (int corner = 1; corner < strip.size; ++corner) {
+    low = std::min(low, strip.corners[corner].x);
+    high = std::max(high, strip.corners[corner].x);
+  }
+  const int first = std::clamp(static_cast<int>(std::floor(low)), 0, width - 1);
+  const int last = std::clamp(static_cast<int>(std::floor(high)), 0, width - 1);
+  const double least_inside = area / (4 * (high - low) * (high - low));
+  for (int x = first; x <= last; ++x) {
+    if (x > first && x < last) {
+      visit(x, least_inside, 1.0);
+    } else {
+      const double own = clipped(clipped(strip, {1, 0}, x), {-1, 0}, -(x + 1)).area();
+      visit(x, own, own);
+    }
+  }
+}
+
 }  // namespace
 
 SurfacePoint Footprint::sample(double x, double y) const {
@@ -120,25 +144,62 @@ void Atlas::footprint(int x, int y, Footprint& out) const {
 }
 
 void Atlas::count_texels() {
-  // Row by row, so that the sum does not depend on threads.
-  std::vector<double> covered(static_cast<std::size_t>(num_rows()), 0.0);
+  // Block row by block row, so that the sum does not depend on threads.
+  std::vector<double> covered(static_cast<std::size_t>(blocks_y_), 0.0);
   std::vector<std::uint64_t> counts(covered.size(), 0);
-  for_each_range(covered.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    Footprint footprint;
-    for (std::size_t y = begin; y < end; ++y) {
-      for (int x = 0; x < width(); ++x) {
-        this->footprint(x, static_cast<int>(y), footprint);
-        counts[y] += !footprint.is_empty();
-        covered[y] += footprint.coverage;
-      }
+  for_each_range(covered.size(), 1, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint8_t> is_covered;
+    for (std::size_t by = begin; by < end; ++by) {
+      covered[by] = cover_block_row(static_cast<int>(by), is_covered);
+      counts[by] = static_cast<std::uint64_t>(std::count(is_covered.begin(), is_covered.end(), 1));
     }
   });
   double sum = 0;
-  for (std::size_t y = 0; y < covered.size(); ++y) {
-    num_texels_ += counts[y];
-    sum += covered[y];
+  for (std::size_t by = 0; by < covered.size(); ++by) {
+    num_texels_ += counts[by];
+    sum += covered[by];
   }
   fill_ = sum / (static_cast<double>(width()) * num_rows());
+}
+
+double Atlas::cover_block_row(int by, std::vector<std::uint8_t>& is_covered) const {
+  const int first_row = by * kBlock, end_row = std::min(first_row + kBlock, num_rows());
+  is_covered.assign(static_cast<std::size_t>(end_row - first_row) * width(), 0);
+  double sum = 0;
+  Footprint footprint;
+  for (int bx = 0; bx < blocks_x_; ++bx) {
+    const std::size_t block = static_cast<std::size_t>(by) * blocks_x_ + bx;
+    for (std::uint64_t k = first_in_block_[block]; k < first_in_block_[block + 1]; ++k) {
+      const PlaneTriangle& c = layout_.corners[in_block_[k]];
+      // A triangle counts in the first of the row's blocks that it lies in.
+      const double low_x = std::min({c[0].x, c[1].x, c[2].x});
+      if (std::clamp(static_cast<int>(std::floor(low_x / kBlock)), 0, blocks_x_ - 1) != bx) continue;
+      PlanePolygon triangle;
+      for (const Vec2 corner : c) triangle.add(corner);
+      const auto [low_y, high_y] = std::minmax({c[0].y, c[1].y, c[2].y});
+      const int begin_y = std::max(first_row, static_cast<int>(std::floor(std::max(low_y, 0.0))));
+      const int end_y = std::min(end_row, static_cast<int>(std::ceil(std::max(high_y, 0.0))));
+      for (int y = begin_y; y < end_y; ++y) {
+        const PlanePolygon strip = clipped(clipped(triangle, {0, 1}, y), {0, -1}, -(y + 1));
+        const double area = strip.area();
+        if (area <= 0) continue;
+        sum += area;
+        std::uint8_t* row = &is_covered[static_cast<std::size_t>(y - first_row) * width()];
+        for_each_column(strip, area, width(), [&](int x, double least, double most) {
+          if (row[x] || most < kNegligibleCoverage) return;
+          // A fan of up to five triangles: one of them is not negligible, or let the footprint say.
+          constexpr int kMostInFan = 5;
+          if (least < kMostInFan * kNegligibleCoverage) {
+            this->footprint(x, y, footprint);
+            row[x] = !footprint.is_empty();
+          } else {
+            row[x] = 1;
+          }
+        });
+      }
+    }
+  }
+  return sum;
 }
 
 }  // namespace radbake::radiosity

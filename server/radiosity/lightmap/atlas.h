@@ -56,6 +56,8 @@ class Atlas {
   void measure_density();
   void sort_into_blocks();
   void count_texels();
+  /// Marks what the rows of a row of blocks cover. Returns the area, texels. Shapes: is_covered [rows * width].
+  double cover_block_row(int by, std::vector<std::uint8_t>& is_covered) const;
 
   const Surfaces* surfaces_ = nullptr;
   Layout layout_;

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <random>
+
 #include "server/radiosity/survey/survey.h"
 #include "tests/scenes/rooms.h"
 
@@ -40,6 +44,46 @@ TEST(Atlas, CoversExactlyTheAreaOfTheCharts) {
     EXPECT_EQ(texels, atlas.num_texels());
     EXPECT_NEAR(atlas.fill(), 12 * 0.2 * 0.2, 1e-6);
   }
+}
+
+// Large triangles and small ones, slivers, needles below a texel: counting them by strips finds what footprints find.
+TEST(Atlas, CountsTheTexelsThatHaveAFootprint) {
+  constexpr int kSize = 128, kTriangles = 400;
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> place(2, kSize - 2), exponent(-7, 1.5), any(-1, 1);
+  Scene scene = tests::furnace_room(0.5);
+  scene.meshes.resize(1);
+  Mesh& mesh = scene.meshes[0];
+  mesh.positions.clear();
+  mesh.texcoord1.clear();
+  mesh.triangles.clear();
+  Layout layout;
+  layout.width = layout.height = kSize;
+  layout.num_sheets = 1;
+  for (std::uint32_t t = 0; t < kTriangles; ++t) {
+    const Vec2 a{place(random), place(random)};
+    const auto moved = [&](double length) {
+      return Vec2{std::clamp(a.x + length * any(random), 0.0, double{kSize}),
+                  std::clamp(a.y + length * any(random), 0.0, double{kSize})};
+    };
+    const double longest = std::pow(10, exponent(random)), width = std::pow(10, exponent(random));
+    layout.corners.push_back({a, moved(longest), moved(width)});
+    mesh.positions.insert(mesh.positions.end(), {{any(random), any(random), 0}, {2, 0, 0}, {0, 2, 1}});
+    mesh.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  const SurveyedScene surveyed = survey_scene(scene).value();
+  ASSERT_EQ(surveyed.surfaces.size(), std::size_t{kTriangles});
+  const Atlas atlas = Atlas::make(surveyed.surfaces, layout).value();
+  std::uint64_t texels = 0;
+  Footprint footprint;
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      atlas.footprint(x, y, footprint);
+      texels += !footprint.is_empty();
+    }
+  }
+  EXPECT_GT(texels, 1000u);
+  EXPECT_EQ(atlas.num_texels(), texels);
 }
 
 TEST(Atlas, SamplesLieInsideTheirTexelUniformly) {

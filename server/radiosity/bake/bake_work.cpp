@@ -9,10 +9,10 @@ namespace radbake::radiosity {
 namespace {
 
 /// Of a shadow ray's time, the part that Embree takes; the rest draws and weighs the sample. Measured, see
-/// docs/costs.md.
-constexpr double kTracedShare = 0.6;
-/// A ray through what is see-through, over one that meets opaque surfaces only. Measured there too.
-constexpr double kSeeThroughExcess = 0.35;
+/// plan/docs/costs.md.
+constexpr double kTracedShare = 0.5;
+/// What rays cost more where all surfaces are see-through. Measured there too.
+constexpr double kSeeThroughExcess = 0.65;
 
 double bytes_of(const Scene& scene) {
   double bytes = 0;
@@ -180,8 +180,8 @@ std::vector<EffectSeconds> seconds_by_effect(const Preparation& prepared, const 
     of(Effect::kTwoSided) = rows * backs / static_cast<double>(prepared.patches.size());
   }
   const double traced = rows + gather;
-  of(Effect::kAlphaMask) = survey.area_masked_m2 > 0 ? kSeeThroughExcess * traced : 0;
-  of(Effect::kTint) = survey.area_tinted_m2 > 0 ? kSeeThroughExcess * traced : 0;
+  of(Effect::kAlphaMask) = kSeeThroughExcess * traced * survey.area_masked_m2 / survey.area_m2;
+  of(Effect::kTint) = kSeeThroughExcess * traced * survey.area_tinted_m2 / survey.area_m2;
   if (work.num_ray_channels > 1) of(Effect::kTint) += (1 - 1 / channels) * (traced + solve);
   of(Effect::kVertices) =
       channels * static_cast<double>(prepared.plan.num_vertex_groups) *

@@ -1,6 +1,7 @@
 #include "server/radiosity/bake/pilot.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -17,12 +18,16 @@ namespace {
 /// Numbers that keep the pilot's seeds apart from those of the bake.
 enum Purpose : std::uint64_t { kSites = 91, kRays = 92, kLight = 93 };
 
-/// What one row or receiver took and had.
+/// What a row or receiver took and had, mean over a run of neighbours.
 struct Trial {
   double seconds = 0, light_seconds = 0;
   double rays = 0, light_rays = 0, entries = 0;
-  double passed_on = 0;  ///< reflectance times the share of the row that meets surfaces
+  double passed_on = 0;                   ///< reflectance times the share of the row that meets surfaces
+  std::vector<std::uint32_t> backs = {};  ///< among the patches that it met
 };
+
+constexpr std::array kProperties = {&Trial::seconds,    &Trial::light_seconds, &Trial::rays,
+                                    &Trial::light_rays, &Trial::entries,       &Trial::passed_on};
 
 /// The mean of something over trials, with those few left down that were interrupted.
 struct Mean {
@@ -49,6 +54,32 @@ std::size_t spread_index(std::size_t k, std::size_t n) {
   constexpr double kGolden = 0.61803398874989485;
   const double place = std::fmod((static_cast<double>(k) + 0.5) * kGolden, 1.0);
   return std::min(static_cast<std::size_t>(place * static_cast<double>(n)), n - 1);
+}
+
+/// Neighbours that are tried one after the other: as in a bake, all but the first find in the caches what the one
+/// before has read. The first is not counted.
+constexpr std::size_t kRun = 4;
+
+/// Tries the run of items at place `index` of the pattern, with try_item(k) -> optional<Trial>. Empty: there were none.
+template <typename TryItem>
+std::optional<Trial> try_run(std::size_t index, std::size_t num_items, const TryItem& try_item) {
+  const std::size_t first = std::min(spread_index(index, num_items), num_items - std::min(num_items, kRun));
+  Trial sum;
+  int num = 0;
+  for (std::size_t k = first; k < std::min(first + kRun, num_items); ++k) {
+    const std::optional<Trial> trial = try_item(k);
+    if (!trial || (k == first && num_items >= kRun)) continue;
+    for (const auto property : kProperties) {
+      sum.*property += (*trial).*property;
+    }
+    sum.backs.insert(sum.backs.end(), trial->backs.begin(), trial->backs.end());
+    ++num;
+  }
+  if (num == 0) return std::nullopt;
+  for (const auto property : kProperties) {
+    sum.*property /= num;
+  }
+  return sum;
 }
 
 /// Rows and receivers of a prepared scene, one at a time, as its bake makes them.
@@ -83,12 +114,11 @@ class Pilot {
     const double lit = thread_cpu_seconds();
     const PatchSample sample = sampler_->sample_light(patch, scratch);
     const double end = thread_cpu_seconds();
-    Trial trial{end - start,
-                end - lit,
-                static_cast<double>(row.traced),
-                static_cast<double>(sample.light_rays),
-                static_cast<double>(row.entries.size()),
-                0};
+    Trial trial{end - start, end - lit, static_cast<double>(row.traced), static_cast<double>(sample.light_rays),
+                static_cast<double>(row.entries.size())};
+    for (const FormFactorRow::Entry& entry : row.entries) {
+      if (prepared_.patches.is_back(entry.patch)) trial.backs.push_back(entry.patch);
+    }
     if (row.counted > 0) {
       trial.passed_on = mean_component(sample.reflectance) * (1 - (row.escaped + row.absorbed) / row.counted);
     }
@@ -176,8 +206,24 @@ struct Sounding {
     };
     return {relative(rows), relative(receivers)};
   }
+  /// Backs that the rows of all fronts may meet, from those that a few have met once and twice: a patch has a row of
+  /// its own only where another meets it. Source: Chao 1984 (the number of species, bias-corrected).
+  double backs_reached() const {
+    std::vector<std::uint32_t> met;
+    for (const Trial& row : rows) met.insert(met.end(), row.backs.begin(), row.backs.end());
+    std::sort(met.begin(), met.end());
+    double num = 0, once = 0, twice = 0;
+    for (std::size_t i = 0; i < met.size();) {
+      const std::size_t begin = i;
+      while (i < met.size() && met[i] == met[begin]) ++i;
+      ++num;
+      once += i - begin == 1 ? 1 : 0;
+      twice += i - begin == 2 ? 1 : 0;
+    }
+    return num + once * (once - 1) / (2 * (twice + 1));
+  }
   /// What the work leaves open until it is tried.
-  void complete(BakeWork& work) const {
+  void complete(double num_fronts, BakeWork& work) const {
     const auto mean = [](const std::vector<Trial>& trials, double Trial::*property) {
       return mean_of(trials, [=](const Trial& trial) { return trial.*property; }).value;
     };
@@ -185,7 +231,7 @@ struct Sounding {
       work.rays_per_row = mean(rows, &Trial::rays);
       work.light_rays_per_row = mean(rows, &Trial::light_rays);
       work.entries_per_row = mean(rows, &Trial::entries);
-      work.sweeps = expected_sweeps(mean(rows, &Trial::passed_on), SolveOptions{}.relative_tolerance);
+      work.num_rows = num_fronts + std::min(backs_reached(), work.num_patches - num_fronts);
     }
     if (!receivers.empty()) {
       work.rays_per_receiver = mean(receivers, &Trial::rays);
@@ -197,33 +243,37 @@ struct Sounding {
 /// Tries rows and receivers in growing rounds, on all threads, until they have taken their share of what they predict.
 Sounding sound(const Preparation& prepared, const BakeWork& counted, const HostCosts& known,
                const std::stop_token& stop) {
-  constexpr std::size_t kFirst = 4, kMost = 4096;
+  constexpr std::size_t kFirst = 2, kMost = 2048;
   constexpr double kExact = 0.02;  // standard error over mean: more trials would tell no more than the model
   const double start = process_cpu_seconds();
   const Pilot pilot(prepared);
   Sounding sounding;
   std::size_t next_row = 0, next_receiver = 0;
   for (std::size_t size = kFirst; size <= kMost && !stop.stop_requested(); size *= 2) {
-    std::vector<Trial> rows(pilot.num_rows() > 0 ? std::min(size, pilot.num_rows()) : 0);
+    std::vector<std::optional<Trial>> rows(std::min(size, pilot.num_rows()));
     std::vector<std::optional<Trial>> receivers(std::min(2 * size, pilot.num_receivers()));
     for_each_range(rows.size(), 1, [&](std::size_t begin, std::size_t end) {
       PatchScratch scratch = pilot.make_row_scratch();
       for (std::size_t k = begin; k < end && !stop.stop_requested(); ++k) {
-        rows[k] = pilot.try_row(spread_index(next_row + k, pilot.num_rows()), scratch);
+        rows[k] = try_run(next_row + k, pilot.num_rows(),
+                          [&](std::size_t row) -> std::optional<Trial> { return pilot.try_row(row, scratch); });
       }
     });
-    for_each_range(receivers.size(), 2, [&](std::size_t begin, std::size_t end) {
+    for_each_range(receivers.size(), 1, [&](std::size_t begin, std::size_t end) {
       Footprint footprint;
       ReceiveScratch scratch;
       for (std::size_t k = begin; k < end && !stop.stop_requested(); ++k) {
-        receivers[k] = pilot.try_receiver(spread_index(next_receiver + k, pilot.num_receivers()), footprint, scratch);
+        receivers[k] = try_run(next_receiver + k, pilot.num_receivers(),
+                               [&](std::size_t receiver) { return pilot.try_receiver(receiver, footprint, scratch); });
       }
     });
     next_row += rows.size();
     next_receiver += receivers.size();
     // The first round finds nothing in the caches: it counts only until there is another.
     if (size == 2 * kFirst) sounding.rows.clear(), sounding.receivers.clear();
-    sounding.rows.insert(sounding.rows.end(), rows.begin(), rows.end());
+    for (const std::optional<Trial>& trial : rows) {
+      if (trial) sounding.rows.push_back(*trial);
+    }
     for (const std::optional<Trial>& trial : receivers) {
       if (trial) sounding.receivers.push_back(*trial);
     }
@@ -231,7 +281,7 @@ Sounding sound(const Preparation& prepared, const BakeWork& counted, const HostC
 
     // Another round takes about twice of what this one took.
     BakeWork work = counted;
-    sounding.complete(work);
+    sounding.complete(static_cast<double>(pilot.num_rows()), work);
     const double whole = total_of(predict_stages(work, sounding.costs(known), {})).cpu_seconds;
     const CostSpread spread = sounding.spread();
     const bool is_exact = sounding.receivers.size() > kFirst && spread.row < kExact && spread.receiver < kExact;
@@ -252,7 +302,7 @@ Prediction predict_bake(const Preparation& prepared, double preparing_seconds, c
   const bool has_stored = prepared.options.costs.texel_ray > 0;
   if (!has_stored || total_of(predict_stages(work, known, spread)).cpu_seconds >= kNoPilotSeconds) {
     const Sounding sounding = sound(prepared, work, known, stop);
-    sounding.complete(work);
+    sounding.complete(static_cast<double>(prepared.patches.num_cells()), work);
     costs = sounding.costs(known);
     spread = sounding.spread();
     prediction.source = "pilot";

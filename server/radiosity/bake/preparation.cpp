@@ -1,6 +1,7 @@
 #include "server/radiosity/bake/preparation.h"
 
 #include <algorithm>
+#include <sstream>
 
 #include "server/radiosity/bake/bake.h"
 #include "server/radiosity/bake/cpu_clock.h"
@@ -28,6 +29,18 @@ Result<void> choose_effects(Preparation& prepared) {
     plan.warnings.push_back({"no_light_arrives", "no light arrives at any surface: the lightmaps are black"});
   }
   return {};
+}
+
+/// Adds to the plan of skies how much of the scene sees them: known when rays have probed it.
+void tell_escape_share(const Survey& survey, std::vector<EffectPlan>& effects) {
+  std::ostringstream text;
+  text.precision(3);
+  text << ": " << 100 * survey.escape_share << " % of rays from surfaces escape to it";
+  for (EffectPlan& plan : effects) {
+    if ((plan.effect != Effect::kSky && plan.effect != Effect::kHdri) || plan.state != EffectState::kOn) continue;
+    plan.reason += text.str();
+    plan.value = survey.escape_share;
+  }
 }
 
 }  // namespace
@@ -75,6 +88,7 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
 
   BakePlan& plan = prepared->plan;
   plan.survey = prepared->surveyed.survey;
+  tell_escape_share(plan.survey, plan.effects);
   if (prepared->atlas) {
     plan.atlas_size = prepared->atlas->width();
     plan.atlas_height = prepared->atlas->height();

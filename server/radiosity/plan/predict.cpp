@@ -6,7 +6,7 @@
 namespace radbake::radiosity {
 namespace {
 
-// Measured on bakes of 2 to 60 s of ten scenes, see docs/costs.md.
+// Measured on bakes of 2 to 60 s of ten scenes, see plan/docs/costs.md.
 
 /// What the model is off by beside the spread of its costs: 95 % of bakes.
 constexpr double kModelError = 0.25;
@@ -15,10 +15,10 @@ constexpr double kEfficiency = 0.95;
 /// Seconds for each pixel of a layer: filled, seams levelled, sent.
 constexpr double kPixelSeconds = 60e-9;
 // Bytes.
-constexpr double kProcess = 38e6;       ///< the worker before it has a scene
+constexpr double kProcess = 28e6;       ///< the worker before it has a scene
 constexpr double kTriangle = 850;       ///< surfaces, tree, layout, patches' maps
 constexpr double kPatch = 300;          ///< with its piece of the maps, its light and its row's sums
-constexpr double kEstimatedEntry = 24;  ///< kept by rows, collected, transposed
+constexpr double kEstimatedEntry = 17;  ///< kept by rows, collected, transposed
 constexpr double kPixel = 36;           ///< of the gather's layer, its state, and its copy in the outcome
 
 double operator_bytes(const BakeWork& work) {

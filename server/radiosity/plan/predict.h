@@ -38,14 +38,14 @@ struct CostSpread {
   double row = 0, receiver = 0;
 };
 
-/// Costs where a host has none of its own, and what is the same everywhere; measured, see docs/costs.md.
+/// Costs where a host has none of its own, and what is the same everywhere; measured, see plan/docs/costs.md.
 inline constexpr HostCosts kUsualCosts = {.row_ray = 0.45e-6,
                                           .texel_ray = 0.45e-6,
                                           .light_ray = 0.4e-6,
                                           .row = 0,
                                           .receiver = 0,
                                           .entry_step = 1.5e-9,
-                                          .entry = 60e-9};
+                                          .entry = 0.35e-6};
 
 /// A solve of one channel, over one of three: what is read is the same, what is added is a third. Measured too.
 inline constexpr double kOneChannelShare = 0.6;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/radiosity/patches/grid_polygon.h"
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -60,6 +61,28 @@ bool cut_to(Contact& segment, double at_a, double at_b, double tolerance) {
   return true;
 }
 
+/// What corners span, each side wider by what contacts are let slip and by `tolerance`.
+struct Box {
+  Vec3 low, high;
+
+  Box(const std::array<Vec3, 3>& corners, double tolerance) {
+    double size = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto [least, most] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+      low[axis] = least;
+      high[axis] = most;
+      size = std::max(size, most - least);
+    }
+    const double slip = 4 * kNegligible * size + tolerance;
+    low -= Vec3{slip, slip, slip};
+    high += Vec3{slip, slip, slip};
+  }
+  bool meets(const Box& other) const {
+    return low.x <= other.high.x && other.low.x <= high.x && low.y <= other.high.y && other.low.y <= high.y &&
+           low.z <= other.high.z && other.low.z <= high.z;
+  }
+};
+
 /// Whether the segment from a to b runs through the unit cell at (column, row) by more than a rounding.
 bool runs_through_cell(Vec2 a, Vec2 b, double column, double row) {
   const Vec2 d = b - a;
@@ -90,32 +113,32 @@ void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::ve
   std::vector<Piece> sorted(patches_.pieces_.size());
   for (std::size_t i = 0; i < sorted.size(); ++i) sorted[next[cell_of_piece[i]]++] = patches_.pieces_[i];
 
-  // Cut each cell, and number its parts in the order of their sides.
+  // Cut each cell by itself.
+  const auto pieces_of = [&](std::size_t c) {
+    return std::span<const Piece>(&sorted[first[c]], first[c + 1] - first[c]);
+  };
+  std::vector<CellCuts> cells(num_cells);
+  constexpr std::size_t kCellsPerTask = 16;
+  for_each_range(num_cells, kCellsPerTask, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> near;
+    for (std::size_t c = begin; c < end; ++c) cells[c] = cut_cell(pieces_of(c), stop.stop_requested(), near);
+  });
+
+  // Number the parts in the order of cells and of their sides.
   std::vector<std::uint8_t> is_part_double_sided;
-  std::vector<Cut> cuts;
-  std::vector<std::pair<std::uint32_t, Piece>> parts;
   patches_.pieces_.clear();
   cell_of_piece.clear();
   patches_.first_part_.assign(1, 0);
   patches_.first_cut_.assign(1, 0);
   for (std::size_t c = 0; c < num_cells; ++c) {
-    const std::span<const Piece> pieces(&sorted[first[c]], first[c + 1] - first[c]);
-    cuts.clear();
-    if (!stop.stop_requested()) find_cuts(pieces, cuts);
-    parts.clear();
-    for (const Piece& piece : pieces) split(piece, cuts, parts);
-    std::vector<std::uint32_t> sides;
-    sides.reserve(parts.size());
-    for (const auto& part : parts) sides.push_back(part.first);
-    std::sort(sides.begin(), sides.end());
-    sides.erase(std::unique(sides.begin(), sides.end()), sides.end());
+    auto& [cuts, parts, sides] = cells[c];
     const std::size_t added = (sides.size() - 1) * (is_double_sided[c] ? 2 : 1);
     if (added > max_new) {
       ++patches_.num_uncut_;
       cuts.clear();
       sides.assign(1, 0);
       parts.clear();
-      for (const Piece& piece : pieces) parts.emplace_back(0, piece);
+      for (const Piece& piece : pieces_of(c)) parts.emplace_back(0, piece);
     } else {
       max_new -= added;
     }
@@ -129,12 +152,25 @@ void ContactCutter::cut_cells(std::vector<std::uint32_t>& cell_of_piece, std::ve
     patches_.cuts_.insert(patches_.cuts_.end(), cuts.begin(), cuts.end());
     patches_.first_part_.push_back(static_cast<std::uint32_t>(patches_.part_sides_.size()));
     patches_.first_cut_.push_back(static_cast<std::uint32_t>(patches_.cuts_.size()));
+    cells[c] = {};
   }
   is_double_sided = std::move(is_part_double_sided);
 }
 
-void ContactCutter::find_cuts(std::span<const Piece> pieces, std::vector<Cut>& cuts) {
-  cuts.clear();
+ContactCutter::CellCuts ContactCutter::cut_cell(std::span<const Piece> pieces, bool is_whole,
+                                                std::vector<std::uint32_t>& near) const {
+  CellCuts cell;
+  if (!is_whole) find_cuts(pieces, near, cell.cuts);
+  for (const Piece& piece : pieces) split(piece, cell.cuts, cell.parts);
+  cell.sides.reserve(cell.parts.size());
+  for (const auto& part : cell.parts) cell.sides.push_back(part.first);
+  std::sort(cell.sides.begin(), cell.sides.end());
+  cell.sides.erase(std::unique(cell.sides.begin(), cell.sides.end()), cell.sides.end());
+  return cell;
+}
+
+void ContactCutter::find_cuts(std::span<const Piece> pieces, std::vector<std::uint32_t>& near,
+                              std::vector<Cut>& cuts) const {
   // Merged groups have no grid to cut in: their coordinates do not vary.
   const auto& map = patches_.maps_[pieces.front().triangle];
   if (dot(map.per_u, map.per_u) == 0 && dot(map.per_v, map.per_v) == 0) return;
@@ -151,19 +187,26 @@ void ContactCutter::find_cuts(std::span<const Piece> pieces, std::vector<Cut>& c
       }
     }
   }
-  visibility_.triangles_near((low + high) * 0.5, length(high - low) / 2, near_);
+  visibility_.triangles_near((low + high) * 0.5, length(high - low) / 2, near);
+  // Only triangles of other groups whose boxes overlap can meet.
+  const auto box_of = [this](std::uint32_t t) { return Box(surfaces_.corners[t], 2 * surfaces_.ray_offsets[t]); };
   const std::uint32_t group = group_of_[pieces.front().triangle];
+  std::vector<std::pair<std::uint32_t, Box>> others;
+  for (const std::uint32_t other : near) {
+    if (group_of_[other] != group) others.emplace_back(other, box_of(other));
+  }
   std::uint32_t last = kNoPatch;
   for (const Piece& piece : pieces) {
     if (piece.triangle == last) continue;
     last = piece.triangle;
-    for (const std::uint32_t other : near_) {
-      if (group_of_[other] != group) add_contact(piece, other, cuts);
+    const Box own = box_of(piece.triangle);
+    for (const auto& [other, box] : others) {
+      if (own.meets(box)) add_contact(piece, other, near, cuts);
     }
   }
 }
 
-void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, std::vector<Cut>& cuts) const {
+void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, Near near, std::vector<Cut>& cuts) const {
   const std::uint32_t t = piece.triangle;
   const auto& c = surfaces_.corners[t];
   const Vec3 n = surfaces_.normals[t];
@@ -183,7 +226,7 @@ void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, std::ve
     const double at_a = height(contact.a), at_b = height(contact.b);
     if (!cut_to(contact, at_a, at_b, kNegligible)) return;
     // Along a side of the triangle: another surface's border, unless this surface goes on beyond it.
-    if (std::max(std::fabs(at_a), std::fabs(at_b)) <= kNegligible && !goes_on_beyond(t, side)) return;
+    if (std::max(std::fabs(at_a), std::fabs(at_b)) <= kNegligible && !goes_on_beyond(t, side, near)) return;
   }
 
   const auto& map = patches_.maps_[t];
@@ -212,14 +255,14 @@ void ContactCutter::add_contact(const Piece& piece, std::uint32_t other, std::ve
   cuts.push_back(cut);
 }
 
-bool ContactCutter::goes_on_beyond(std::uint32_t triangle, int side) const {
+bool ContactCutter::goes_on_beyond(std::uint32_t triangle, int side, Near near) const {
   // Side 0 is u = 0, between corners 0 and 2; side 1 is v = 0; side 2 lies opposite corner 0.
   const auto& c = surfaces_.corners[triangle];
   const Vec3 a = side == 2 ? c[1] : c[0], b = side == 1 ? c[1] : c[2];
   const auto has = [](const std::array<Vec3, 3>& corners, Vec3 p) {
     return corners[0] == p || corners[1] == p || corners[2] == p;
   };
-  return std::any_of(near_.begin(), near_.end(), [&](std::uint32_t other) {
+  return std::any_of(near.begin(), near.end(), [&](std::uint32_t other) {
     return other != triangle && group_of_[other] == group_of_[triangle] && has(surfaces_.corners[other], a) &&
            has(surfaces_.corners[other], b);
   });

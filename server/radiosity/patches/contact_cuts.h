@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "server/radiosity/patches/patches.h"
@@ -29,17 +30,25 @@ class ContactCutter {
   using Cut = Patches::Cut;
   using Piece = Patches::Piece;
 
-  void find_cuts(std::span<const Piece> pieces, std::vector<Cut>& cuts);
-  void add_contact(const Piece& piece, std::uint32_t other, std::vector<Cut>& cuts) const;
+  /// What is found for one cell, by itself.
+  struct CellCuts {
+    std::vector<Cut> cuts;
+    std::vector<std::pair<std::uint32_t, Piece>> parts;  ///< with the sides of the cuts that they lie on
+    std::vector<std::uint32_t> sides;                    ///< those that parts have, ascending
+  };
+  using Near = std::span<const std::uint32_t>;  ///< triangles around a cell
+
+  CellCuts cut_cell(std::span<const Piece> pieces, bool is_whole, std::vector<std::uint32_t>& near) const;
+  void find_cuts(std::span<const Piece> pieces, std::vector<std::uint32_t>& near, std::vector<Cut>& cuts) const;
+  void add_contact(const Piece& piece, std::uint32_t other, Near near, std::vector<Cut>& cuts) const;
   /// Whether the triangle's group has another triangle across this side.
-  bool goes_on_beyond(std::uint32_t triangle, int side) const;
+  bool goes_on_beyond(std::uint32_t triangle, int side, Near near) const;
   void split(const Piece& piece, std::span<const Cut> cuts, std::vector<std::pair<std::uint32_t, Piece>>& parts) const;
 
   const Surfaces& surfaces_;
   const Visibility& visibility_;
   std::span<const std::uint32_t> group_of_;
   Patches& patches_;
-  std::vector<std::uint32_t> near_;
 };
 
 }  // namespace radbake::radiosity

@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include "server/radiosity/bake/lightmap_layers.h"
 #include "server/radiosity/bake/pilot.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
@@ -14,13 +15,10 @@
 #include "server/radiosity/error/energy.h"
 #include "server/radiosity/gather/gather.h"
 #include "server/radiosity/gather/gather_vertices.h"
-#include "server/radiosity/lightmap/level_seams.h"
 #include "server/radiosity/solve/solve.h"
 
 namespace radbake::radiosity {
 namespace {
-
-constexpr int kPadding = 2;  ///< texels around charts that get their neighbours' mean
 
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
@@ -206,8 +204,8 @@ class Bake {
     GatheredMap map = gather_lightmap(
         scene, atlas, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
         [&](const GatheredTile& tile) {
-          progress_.tile({tile.sheet, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba, layer_name(tile.sheet),
-                          atlas.width(), atlas.height()});
+          progress_.tile({tile.sheet, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba,
+                          lightmap_name(tile.sheet), atlas.width(), atlas.height()});
           progress_.report(BakeStage::kGathering, tile.texels_done, num_receivers);
         },
         stop_);
@@ -216,61 +214,9 @@ class Bake {
     report.num_light_rays += map.num_light_rays;
     report.energy.mean_irradiance = map.mean_irradiance;
 
-    LightmapSummary& summary = report.lightmap;
-    const LayerFinish all = finish_layer(atlas, "", "irradiance", "lx", map.states, map.rgba);
-    summary.num_texels_filled = all.fill.num_filled;
-    summary.num_texels_dilated = all.fill.num_dilated;
-    summary.num_seam_samples = all.seams.num_samples;
-    summary.seam_difference_before = all.seams.difference_before;
-    summary.seam_difference = all.seams.difference;
-    if (!map.direct.empty()) finish_layer(atlas, "_direct", "irradiance", "lx", map.states, map.direct);
-    if (!map.indirect.empty()) finish_layer(atlas, "_indirect", "irradiance", "lx", map.states, map.indirect);
-    if (!map.openness.empty()) finish_layer(atlas, "_ao", "openness", "1", map.states, map.openness);
-    summary.atlas_size = atlas.width();
-    summary.atlas_height = atlas.height();
-    summary.num_lightmaps = atlas.num_sheets();
-    summary.num_texels = atlas.num_texels();
-    summary.texels_per_meter = atlas.texels_per_meter();
-    summary.fill = atlas.fill();
-    summary.num_charts = atlas.layout().num_charts;
-    summary.max_stretch = atlas.layout().max_stretch;
-    for (const MeshPlacement& mesh : atlas.layout().meshes) {
-      summary.num_meshes_kept += mesh.source == UvSource::kKept;
-      summary.num_meshes_placed += mesh.source == UvSource::kPlaced;
-      summary.num_meshes_unwrapped += mesh.source == UvSource::kUnwrapped;
-    }
+    report.lightmap = append_layers(surfaces_, atlas, map, outcome_.layers);
     return true;
   }
-
-  /// How a layer was completed.
-  struct LayerFinish {
-    FillCounts fill;
-    SeamReport seams;
-  };
-
-  /// Fills and levels the sheets of a layer and puts them into the outcome. Takes the values.
-  LayerFinish finish_layer(const Atlas& atlas, const std::string& suffix, const char* quantity, const char* unit,
-                           const std::vector<TexelState>& states, std::vector<float>& rgba) {
-    LayerFinish finish;
-    const auto sheet_texels = static_cast<std::size_t>(atlas.width()) * atlas.height();
-    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
-      const std::size_t first = sheet_texels * static_cast<std::size_t>(sheet);
-      const FillCounts counts = fill_from_neighbours(std::span(states).subspan(first, sheet_texels), atlas.width(),
-                                                     kPadding, std::span(rgba).subspan(4 * first, 4 * sheet_texels));
-      finish.fill.num_filled += counts.num_filled;
-      finish.fill.num_dilated += counts.num_dilated;
-    }
-    finish.seams = level_seams(surfaces_, atlas.layout(), states, rgba);
-    for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
-      const auto first = rgba.begin() + static_cast<std::ptrdiff_t>(4 * sheet_texels) * sheet;
-      outcome_.layers.push_back({layer_name(sheet) + suffix, quantity, unit, atlas.width(), atlas.height(), 4,
-                                 std::vector<float>(first, first + static_cast<std::ptrdiff_t>(4 * sheet_texels))});
-    }
-    rgba = {};
-    return finish;
-  }
-
-  static std::string layer_name(int sheet) { return "lightmap_" + std::to_string(sheet); }
 
   void describe_meshes(const GatheredVertices& vertices) {
     BakeReport& report = outcome_.report;

@@ -10,7 +10,7 @@ namespace {
 
 /// Of a shadow ray's time, the part that Embree takes; the rest draws and weighs the sample. Measured, see
 /// plan/docs/costs.md.
-constexpr double kTracedShare = 0.5;
+constexpr double kTracedShare = 0.4;
 /// What rays cost more where all surfaces are see-through. Measured there too.
 constexpr double kSeeThroughExcess = 0.65;
 

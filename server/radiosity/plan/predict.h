@@ -44,7 +44,7 @@ inline constexpr HostCosts kUsualCosts = {.row_ray = 0.45e-6,
                                           .light_ray = 0.4e-6,
                                           .row = 0,
                                           .receiver = 0,
-                                          .entry_step = 1.5e-9,
+                                          .entry_step = 6e-9,
                                           .entry = 0.35e-6};
 
 /// A solve of one channel, over one of three: what is read is the same, what is added is a third. Measured too.

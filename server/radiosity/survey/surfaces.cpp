@@ -8,9 +8,11 @@
 namespace radbake::radiosity {
 namespace {
 
+/// Equal values give that value itself, to the last bit.
 template <typename T>
 T interpolated(const std::vector<T>& values, const std::array<std::uint32_t, 3>& vertices, const SurfacePoint& p) {
-  return values[vertices[0]] * (1 - p.u - p.v) + values[vertices[1]] * p.u + values[vertices[2]] * p.v;
+  const T first = values[vertices[0]];
+  return first + (values[vertices[1]] - first) * p.u + (values[vertices[2]] - first) * p.v;
 }
 
 Vec2 texture_coordinate(const Surfaces& surfaces, const SurfacePoint& p, const TextureReference& reference) {

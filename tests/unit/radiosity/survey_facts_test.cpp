@@ -162,6 +162,27 @@ TEST(SurveyFacts, SumAreasLumensAndTheBrightest) {
   EXPECT_EQ(survey.area_masked_m2, 0);
 }
 
+// What is planned off as flat is the same to the last bit as what is simulated: a triangle of one colour too.
+TEST(SurveyFacts, CallFlatWhatIsTheSameToTheLastBit) {
+  Scene scene = box(true);
+  scene.meshes[0].colors.assign(scene.meshes[0].positions.size(), {0.3, 0.7, 0.9});
+  SurveyedScene surveyed = survey_scene(scene).value();
+  EXPECT_EQ(surveyed.survey.varying_reflectance.num_flat, 1u);
+  std::vector<Vec3> simulated;
+  const SobolPoints points(64);
+  const auto seeds = SobolPoints::seeds_of(1);
+  const auto at = [&](int i) {
+    return SurfacePoint{0, points.coordinate(i, 0, seeds) / 2, points.coordinate(i, 1, seeds) / 2};
+  };
+  for (int i = 0; i < points.size(); ++i) simulated.push_back(surveyed.surfaces.reflectance(at(i)));
+  EffectSet without = EffectSet::all();
+  without.set(Effect::kTexturedReflectance, false);
+  surveyed.surfaces.simulate(without);
+  for (int i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(surveyed.surfaces.reflectance(at(i)), simulated[static_cast<std::size_t>(i)]);
+  }
+}
+
 TEST(SurveyFacts, ProbeWhatEscapes) {
   const auto probed = [](const Scene& scene) {
     SurveyedScene surveyed = survey_scene(scene).value();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
 
 #include "server/radiosity/threads/for_each_range.h"
@@ -17,16 +18,19 @@ constexpr double kNegligibleCoverage = 1e-6;
 /// height of a convex polygon is a concave function of x, so with an area A and a width W it has at least A / (4 W^2)
 /// there.
 template <typename Visit>
-void for_each_column(const PlanePolygon& strip, double area, int width, const Visit& visit) {
+void for_each_column(const PlanePolygon& strip, double area, std::span<const std::uint8_t> is_known,
+                     const Visit& visit) {
   double low = strip.corners[0].x, high = low;
   for (int corner = 1; corner < strip.size; ++corner) {
     low = std::min(low, strip.corners[corner].x);
     high = std::max(high, strip.corners[corner].x);
   }
-  const int first = std::clamp(static_cast<int>(std::floor(low)), 0, width - 1);
-  const int last = std::clamp(static_cast<int>(std::floor(high)), 0, width - 1);
+  const int end = static_cast<int>(is_known.size());
+  const int first = std::clamp(static_cast<int>(std::floor(low)), 0, end - 1);
+  const int last = std::clamp(static_cast<int>(std::floor(high)), 0, end - 1);
   const double least_inside = area / (4 * (high - low) * (high - low));
   for (int x = first; x <= last; ++x) {
+    if (is_known[static_cast<std::size_t>(x)]) continue;
     if (x > first && x < last) {
       visit(x, least_inside, 1.0);
     } else {
@@ -184,9 +188,9 @@ double Atlas::cover_block_row(int by, std::vector<std::uint8_t>& is_covered) con
         const double area = strip.area();
         if (area <= 0) continue;
         sum += area;
-        std::uint8_t* row = &is_covered[static_cast<std::size_t>(y - first_row) * width()];
-        for_each_column(strip, area, width(), [&](int x, double least, double most) {
-          if (row[x] || most < kNegligibleCoverage) return;
+        const auto row = std::span(is_covered).subspan(static_cast<std::size_t>(y - first_row) * width(), width());
+        for_each_column(strip, area, row, [&](int x, double least, double most) {
+          if (most < kNegligibleCoverage) return;
           // A fan of up to five triangles: one of them is not negligible, or let the footprint say.
           constexpr int kMostInFan = 5;
           if (least < kMostInFan * kNegligibleCoverage) {

@@ -67,7 +67,6 @@ Scene room_of_vases() {
 Scene hall_with_lamps() {
   Scene scene = tests::make_furnished_hall();
   scene.sky = {};
-  scene.materials[0].reflectance = {0.5, 0.5, 0.5};
   for (int i = 0; i < 3; ++i) {
     scene.lights.push_back({"lamp", PointLight{{4.0 + 6 * i, 5.5, 4.0 + 3 * i}, {900, 800, 700}}});
   }

@@ -151,7 +151,18 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop
     sweeps_since_best = worst < 0.99 * best ? 0 : sweeps_since_best + 1;
     best = std::min(best, worst);
   }
-  repair_.repaired_row_error_max = worst;
+  if (stop.stop_requested()) return;
+
+  // Where no scaling fits, rows may be left above 1, and reflect more than they get. Taking d_i down by the excess takes
+  // all rows down, so one pass is enough.
+  constexpr double kRounding = 1e-12;
+  bool is_limited = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(target[i] > 0) || sums[i] <= areas_[i] * (1 + kRounding)) continue;
+    scale_[i] *= areas_[i] / sums[i];
+    is_limited = true;
+  }
+  repair_.repaired_row_error_max = is_limited ? measure(false) : worst;
 }
 
 SparseOperator::ExchangeRow SparseOperator::exchange_row(std::uint32_t i) const {

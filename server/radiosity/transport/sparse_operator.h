@@ -28,9 +28,10 @@ struct TransportRepair {
 ///   S_ij = (w_ij + w_ji) / (N_i / A_i + N_j / A_j)          w: rays that arrived, N: rays of the row
 ///
 /// A symmetric scaling F_ij = d_i S_ij d_j / A_i then restores the measured row sums r_i = 1 - (escaped +
-/// absorbed)/N_i: exactly where such a scaling exists (closed scenes), else as near as its fixed point comes. Cost:
-/// O(entries) memory, 8 bytes each; O(entries) a scaling sweep. Source: Knight, Ruiz & Ucar 2014 (symmetric scaling);
-/// van Leersum 1989 (why row sums and reciprocity both matter).
+/// absorbed)/N_i: exactly where such a scaling exists (closed scenes), else as near as its fixed point comes. No row is
+/// left with more than 1, so that no reflectance below 1 diverges.
+/// Cost: O(entries) memory, 8 bytes each; O(entries) a scaling sweep.
+/// Source: Knight, Ruiz & Ucar 2014 (symmetric scaling); van Leersum 1989 (why row sums and reciprocity both matter).
 class SparseOperator final : public TransportOperator {
  public:
   /// Stopped early, the operator means nothing.

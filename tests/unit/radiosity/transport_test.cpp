@@ -97,6 +97,23 @@ TEST(SparseOperator, SaysWhereNoScalingFits) {
   EXPECT_GT(transport.repair().repaired_row_error_max, 0.1);
 }
 
+// Few rays from slivers tell of exchanges that cannot be: patches 0 and 2 see nothing but patch 1, which is five times
+// smaller than either. No scaling fits, but a row that sums to more than 1 would make light out of nothing.
+TEST(SparseOperator, LetsNoRowPassOnMoreThanItGets) {
+  EstimatedRows rows;
+  rows.first = {0, 1, 3, 4};
+  rows.entries = {{1, 100}, {0, 50}, {2, 50}, {1, 100}};
+  rows.counted = {100, 100, 100};
+  rows.escaped = rows.absorbed = {0, 0, 0};
+  rows.areas = {1, 0.2, 1};
+  const SparseOperator transport(rows);
+  double largest = 0;
+  for (std::uint32_t i = 0; i < 3; ++i) largest = std::max(largest, transport.row_sum(i));
+  EXPECT_NEAR(largest, 1, kRounding);
+  EXPECT_GT(transport.repair().repaired_row_error_max, 0.1);
+  EXPECT_NEAR(form_factor(transport, 0, 1), 0.2 * form_factor(transport, 1, 0), kRounding);
+}
+
 TEST(SparseOperator, LeavesPatchesWithoutRowsEmpty) {
   EstimatedRows rows;
   rows.first = {0, 1, 2, 2};

@@ -8,6 +8,7 @@
 #include "server/radiosity/bake/on_threads.h"
 #include "server/radiosity/bake/pilot.h"
 #include "server/radiosity/survey/probe.h"
+#include "server/radiosity/threads/for_each_range.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -43,6 +44,26 @@ void tell_escape_share(const Survey& survey, std::vector<EffectPlan>& effects) {
   }
 }
 
+double wanted_density(const BakeOptions& options) {
+  return options.texels_per_meter > 0 ? options.texels_per_meter : kDefaultTexelsPerMeter;
+}
+
+/// Where texels and vertices lie. Returns the layout's warnings.
+Result<std::vector<Warning>> lay_out(Preparation& prepared) {
+  const Surfaces& surfaces = prepared.surveyed.surfaces;
+  const BakeOptions& options = prepared.options;
+  std::vector<Warning> warnings;
+  if (options.output != Output::kVertices) {
+    const LayoutOptions wanted{options.lightmap_uv, options.atlas_size, wanted_density(options),
+                               options.texels_per_meter == 0};
+    RADBAKE_ASSIGN_OR_RETURN(Layout layout, make_layout(surfaces, wanted));
+    warnings = std::move(layout.warnings);
+    RADBAKE_ASSIGN_OR_RETURN(prepared.atlas, Atlas::make(surfaces, std::move(layout)));
+  }
+  if (options.output != Output::kLightmap) prepared.groups = group_vertices(surfaces);
+  return warnings;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const BakeOptions& asked, std::stop_token stop) {
@@ -56,16 +77,19 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   const Surfaces& surfaces = prepared->surveyed.surfaces;
   if (stop.stop_requested()) return cancelled;
 
-  const double density = options.texels_per_meter > 0 ? options.texels_per_meter : kDefaultTexelsPerMeter;
-  std::vector<Warning> layout_warnings;
-  if (options.output != Output::kVertices) {
-    const LayoutOptions wanted{options.lightmap_uv, options.atlas_size, density, options.texels_per_meter == 0};
-    RADBAKE_ASSIGN_OR_RETURN(Layout layout, make_layout(surfaces, wanted));
-    layout_warnings = std::move(layout.warnings);
-    RADBAKE_ASSIGN_OR_RETURN(prepared->atlas, Atlas::make(surfaces, std::move(layout)));
+  // The tree needs nothing of the layout: they are made side by side.
+  for (std::uint32_t t = 0; t < surfaces.size() && !prepared->opacity; ++t) {
+    if (surfaces.is_see_through(t)) prepared->opacity = std::make_unique<SurfaceOpacity>(surfaces);
   }
-  if (options.output != Output::kLightmap) prepared->groups = group_vertices(surfaces);
-  if (stop.stop_requested()) return cancelled;
+  Result<std::vector<Warning>> layout_warnings = std::vector<Warning>();
+  for_each_range(2, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t part = begin; part < end; ++part) {
+      if (part == 0) layout_warnings = lay_out(*prepared);
+      if (part == 1) prepared->visibility = make_embree_visibility(surfaces.corners, stop, prepared->opacity.get());
+    }
+  });
+  if (!layout_warnings.ok()) return layout_warnings.error();
+  if (!prepared->visibility || stop.stop_requested()) return cancelled;
 
   double area = 0;
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
@@ -73,13 +97,8 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
     area += surfaces.areas[t] * (scene.materials[surfaces.mesh(t).material].is_double_sided ? 2 : 1);
   }
   const auto max_patches = static_cast<std::size_t>(max_patches_of(options));
-  const double reached_density = prepared->atlas ? prepared->atlas->texels_per_meter() : density;
+  const double reached_density = prepared->atlas ? prepared->atlas->texels_per_meter() : wanted_density(options);
   const double texel_edge = 1 / (reached_density * surfaces.metres_per_unit);
-  for (std::uint32_t t = 0; t < surfaces.size() && !prepared->opacity; ++t) {
-    if (surfaces.is_see_through(t)) prepared->opacity = std::make_unique<SurfaceOpacity>(surfaces);
-  }
-  prepared->visibility = make_embree_visibility(surfaces.corners, stop, prepared->opacity.get());
-  if (!prepared->visibility || stop.stop_requested()) return cancelled;
   if (!surfaces.effects.has(Effect::kOcclusion)) prepared->unblocked = make_unblocked(*prepared->visibility);
   probe_escape(surfaces, *prepared->visibility, prepared->surveyed.survey);
   prepared->patches =
@@ -111,7 +130,7 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   }
   plan.texels_per_meter = reached_density;
   plan.warnings.insert(plan.warnings.begin(), prepared->surveyed.warnings.begin(), prepared->surveyed.warnings.end());
-  plan.warnings.insert(plan.warnings.end(), layout_warnings.begin(), layout_warnings.end());
+  plan.warnings.insert(plan.warnings.end(), layout_warnings->begin(), layout_warnings->end());
   if (prepared->patches.num_uncut() > 0) {
     plan.warnings.push_back({"contacts_not_cut", std::to_string(prepared->patches.num_uncut()) +
                                                      " patches reach across surfaces that stand on them: more would "

@@ -42,6 +42,12 @@ PlanePolygon clipped(const PlanePolygon& polygon, Vec2 normal, double offset) {
 double shared_area(const PlaneTriangle& a, const PlaneTriangle& b) {
   const double turn = twice_area(a);
   if (turn == 0) return 0;
+  // Most neighbours lie beyond one of its sides altogether.
+  for (int k = 0; k < 3; ++k) {
+    const Vec2 edge = a[(k + 1) % 3] - a[k];
+    const auto is_beyond = [&](Vec2 p) { return (turn > 0 ? 1 : -1) * cross(edge, p - a[k]) <= 0; };
+    if (is_beyond(b[0]) && is_beyond(b[1]) && is_beyond(b[2])) return 0;
+  }
   PlanePolygon rest;
   for (const Vec2 corner : b) rest.add(corner);
   for (int k = 0; k < 3; ++k) {
@@ -73,6 +79,7 @@ PlaneGrid::PlaneGrid(const std::vector<PlaneTriangle>& expected) {
       std::max({extent / kMaxCellsAlongSide, extent / std::sqrt(n) / 2,
                 std::sqrt(2 * boxes / (kEntriesPerTriangle * n)), 2 * edges / (kEntriesPerTriangle * n)});
   cells_per_unit_ = 1 / cell;
+  cells_.reserve(std::min(expected.size() * 4, static_cast<std::size_t>(std::pow(extent / cell + 1, 2))));
 }
 
 PlaneGrid::Range PlaneGrid::cells_of(const PlaneTriangle& triangle) const {

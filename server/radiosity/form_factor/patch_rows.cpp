@@ -33,29 +33,28 @@ void PatchSampler::place_sites(std::uint32_t patch, PatchScratch& scratch) const
   const auto seeds = SobolPoints::seeds_of(seed_of(seed_, kSitesOfPatch, patch));
   scratch.sites.clear();
   scratch.opaque_share = 1;
-  double opacities = 0;
-  std::vector<Site> opaque;
   bool is_see_through = false;
   for (int s = 0; s < site_points_.size(); ++s) {
     const SurfacePoint p =
         patches_.sample(patch, site_points_.coordinate(s, 0, seeds), site_points_.coordinate(s, 1, seeds));
-    const Site& site = scratch.sites.emplace_back(side_site(surfaces_, p, patches_.normal(patch, p, surfaces_)));
-    if (!surfaces_.is_see_through(p.triangle)) {
-      opaque.push_back(site);
-      opacities += 1;
-      continue;
-    }
-    is_see_through = true;
-    const double opacity = surfaces_.opacity(p)[channel_];
-    opacities += opacity;
-    if (site_points_.coordinate(s, 2, seeds) < opacity) opaque.push_back(site);
+    scratch.sites.push_back(side_site(surfaces_, p, patches_.normal(patch, p, surfaces_)));
+    is_see_through = is_see_through || surfaces_.is_see_through(p.triangle);
   }
   scratch.is_buried.assign(scratch.sites.size(), 0);
   if (!is_see_through) return;
+
   // Put sites that are opaque in the place of those that are not.
-  scratch.opaque_share = opaque.empty() ? 0 : opacities / static_cast<double>(scratch.sites.size());
-  for (std::size_t s = 0; s < scratch.sites.size() && !opaque.empty(); ++s) {
-    scratch.sites[s] = opaque[s % opaque.size()];
+  double opacities = 0;
+  scratch.opaque.clear();
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    const SurfacePoint& p = scratch.sites[s].point;
+    const double opacity = surfaces_.is_see_through(p.triangle) ? surfaces_.opacity(p)[channel_] : 1;
+    opacities += opacity;
+    if (site_points_.coordinate(static_cast<int>(s), 2, seeds) < opacity) scratch.opaque.push_back(scratch.sites[s]);
+  }
+  scratch.opaque_share = scratch.opaque.empty() ? 0 : opacities / static_cast<double>(scratch.sites.size());
+  for (std::size_t s = 0; s < scratch.sites.size() && !scratch.opaque.empty(); ++s) {
+    scratch.sites[s] = scratch.opaque[s % scratch.opaque.size()];
   }
 }
 

@@ -26,6 +26,7 @@ struct PatchSample {
 /// Buffers that one thread reuses from patch to patch.
 struct PatchScratch {
   std::vector<Site> sites;
+  std::vector<Site> opaque;  ///< of them, where light passes some
   std::vector<std::uint8_t> is_buried;
   double opaque_share = 1;
   std::unique_ptr<RowScratch> row;
@@ -43,7 +44,7 @@ class PatchSampler {
                const DirectLight& direct, std::uint64_t seed, int channel = 0);
 
   std::size_t size() const { return patches_.size(); }
-  PatchScratch make_scratch() const { return {{}, {}, 1, estimator_.make_scratch(), {}}; }
+  PatchScratch make_scratch() const { return {{}, {}, {}, 1, estimator_.make_scratch(), {}}; }
 
   /// The form factors of a patch.
   void sample_row(std::uint32_t patch, PatchScratch& scratch, const std::stop_token& stop, FormFactorRow& row) const;

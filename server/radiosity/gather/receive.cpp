@@ -123,13 +123,13 @@ class Parting {
 };
 
 /// What the light at a receiver consists of.
-struct Light {
+struct ReceivedLight {
   Vec3 all, indirect;
   double openness = 0;
 };
 
 /// What the patches and the sky send along the rays of a row, from the sites that are not out.
-Light light_of_row(const GatherScene& scene, const RowSample& row, const ReceiveScratch& scratch) {
+ReceivedLight light_of_row(const GatherScene& scene, const RowSample& row, const ReceiveScratch& scratch) {
   Vec3 sum, glow, sky;
   std::uint64_t escaped = 0, counted = 0, near = 0;
   const Environment* environment = scene.direct.environment();
@@ -157,12 +157,12 @@ Light light_of_row(const GatherScene& scene, const RowSample& row, const Receive
 
 /// The light at the sites that are not out, from the row that was traced for them. Of channels with rows of their own,
 /// the first says what counts.
-Light light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
-  Light light = light_of_row(scene, scratch.row, scratch);
+ReceivedLight light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+  ReceivedLight light = light_of_row(scene, scratch.row, scratch);
   for (std::size_t c = 0; c < scene.other_rows.size(); ++c) {
     scene.other_rows[c].sample_again(scratch.sites, scratch.hemisphere, scratch.other_row);
     out.rays += scratch.other_row.traced;
-    const Light other = light_of_row(scene, scratch.other_row, scratch);
+    const ReceivedLight other = light_of_row(scene, scratch.other_row, scratch);
     const int channel = static_cast<int>(c) + 1;
     light.all[channel] = other.all[channel];
     light.indirect[channel] = other.indirect[channel];
@@ -233,7 +233,7 @@ Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64
     trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
   }
 
-  const Light light = light_of(scene, light_seed, scratch, out);
+  const ReceivedLight light = light_of(scene, light_seed, scratch, out);
   out.irradiance = light.all;
   out.indirect = light.indirect;
   out.openness = light.openness;

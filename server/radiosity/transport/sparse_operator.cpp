@@ -153,8 +153,8 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop
   }
   if (stop.stop_requested()) return;
 
-  // Where no scaling fits, rows may be left above 1, and reflect more than they get. Taking d_i down by the excess takes
-  // all rows down, so one pass is enough.
+  // Where no scaling fits, rows may be left above 1, and reflect more than they get. Taking d_i down by the excess
+  // takes all rows down, so one pass is enough.
   constexpr double kRounding = 1e-12;
   bool is_limited = false;
   for (std::size_t i = 0; i < n; ++i) {

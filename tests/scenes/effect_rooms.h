@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@ struct EffectRoom {
   std::vector<std::string> on;
   std::vector<std::string> off;  ///< there, and without effect
 };
+/// For the names of tests.
+inline void PrintTo(const EffectRoom& room, std::ostream* out) { *out << room.name; }
 
 /// A room for each effect that light has, named as the effect, and two with all of them: `all` has a sky of every
 /// direction, `all_with_sky` one of one luminance. Each room has two sources of light of different kinds, so that

@@ -6,6 +6,7 @@
 
 #include "common/base/check.h"
 #include "server/radiosity/lights/triangle_sampling.h"
+#include "server/radiosity/survey/facts.h"
 
 namespace radbake::radiosity {
 namespace {
@@ -82,9 +83,7 @@ double DirectLight::emitted_lumens() const {
     if (const auto* point = std::get_if<PointLight>(&light.kind)) {
       lumens += 4 * std::numbers::pi * mean_component(point->intensity);
     } else if (const auto* spot = std::get_if<SpotLight>(&light.kind)) {
-      // 2 pi int falloff dcos: 1 within the inner cone, a square of a linear ramp in the cosine outside: a third.
-      const double inner = std::cos(spot->inner_cone_radians), outer = std::cos(spot->outer_cone_radians);
-      lumens += 2 * std::numbers::pi * (1 - inner + (inner - outer) / 3) * mean_component(spot->intensity);
+      lumens += spot_lumens(*spot);
     }
   }
   return lumens;

@@ -1,9 +1,10 @@
 #pragma once
 
-#include <array>
 #include <bitset>
 #include <optional>
 #include <string_view>
+
+#include "common/scene/effect_names.h"
 
 namespace radbake::radiosity {
 
@@ -35,28 +36,8 @@ enum class Effect {
 inline constexpr int kNumEffects = 22;
 
 /// The ids that users see, in the order of Effect.
-inline constexpr std::array<std::string_view, kNumEffects> kEffectNames = {"emitters",
-                                                                           "point",
-                                                                           "spot",
-                                                                           "directional",
-                                                                           "sun",
-                                                                           "sky",
-                                                                           "hdri",
-                                                                           "occlusion",
-                                                                           "interreflection",
-                                                                           "color",
-                                                                           "textured_reflectance",
-                                                                           "textured_emission",
-                                                                           "alpha_mask",
-                                                                           "tint",
-                                                                           "two_sided",
-                                                                           "vertices",
-                                                                           "layers",
-                                                                           "ambient_occlusion",
-                                                                           "specular",
-                                                                           "refraction",
-                                                                           "normal_map",
-                                                                           "volume"};
+using radbake::kEffectNames;
+static_assert(kEffectNames.size() == kNumEffects);
 inline std::string_view effect_name(Effect effect) { return kEffectNames[static_cast<std::size_t>(effect)]; }
 inline std::optional<Effect> effect_by_name(std::string_view name) {
   for (int e = 0; e < kNumEffects; ++e) {

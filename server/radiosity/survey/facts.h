@@ -29,6 +29,12 @@ inline constexpr double kPlaneTolerance = 0x1p-22;
 /// where the first planes tell.
 ScenePlanes find_scene_planes(const Surfaces& surfaces);
 
+inline bool is_grey(Vec3 color) { return color.x == color.y && color.y == color.z; }
+
+/// Lumens of a spot, mean of the channels: 2 pi int falloff dcos is 1 within the inner cone, and outside, where it is a
+/// square of a linear ramp in the cosine, a third.
+double spot_lumens(const SpotLight& spot);
+
 /// Whether every edge is shared by two triangles, by position.
 bool is_watertight(const Surfaces& surfaces);
 

@@ -14,14 +14,6 @@ constexpr double kLampMargin = 0x1p-18;
 constexpr double kCosineRounding = 1e-12;
 constexpr std::size_t kMostNames = 3;
 
-bool is_grey(Vec3 v) { return v.x == v.y && v.y == v.z; }
-
-double spot_lumens(const SpotLight& spot) {
-  // 2 pi int falloff dcos: 1 within the inner cone, a square of a linear ramp in the cosine outside: a third.
-  const double inner = std::cos(spot.inner_cone_radians), outer = std::cos(spot.outer_cone_radians);
-  return 2 * std::numbers::pi * (1 - inner + (inner - outer) / 3) * mean_component(spot.intensity);
-}
-
 /// What the place of a lamp or the direction of parallel light tells.
 struct Place {
   bool is_facing = false, is_outside = true, is_beyond = true;
@@ -91,6 +83,11 @@ std::vector<std::string> brightest_meshes(const Surfaces& surfaces) {
 }
 
 }  // namespace
+
+double spot_lumens(const SpotLight& spot) {
+  const double inner = std::cos(spot.inner_cone_radians), outer = std::cos(spot.outer_cone_radians);
+  return 2 * std::numbers::pi * (1 - inner + (inner - outer) / 3) * mean_component(spot.intensity);
+}
 
 void find_light_facts(const Surfaces& surfaces, const ScenePlanes& planes, Survey& survey) {
   const Scene& scene = *surfaces.scene;

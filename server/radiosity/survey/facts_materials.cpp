@@ -7,8 +7,6 @@
 namespace radbake::radiosity {
 namespace {
 
-bool is_grey(Vec3 v) { return v.x == v.y && v.y == v.z; }
-
 /// Smallest and largest values by channel.
 struct Range {
   Vec3 low{1, 1, 1}, high{1, 1, 1};

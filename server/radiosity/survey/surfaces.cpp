@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "server/radiosity/survey/facts.h"
 #include "server/radiosity/survey/texture.h"
 
 namespace radbake::radiosity {
@@ -89,7 +90,6 @@ Vec3 Surfaces::opacity(const SurfacePoint& p) const {
 
 bool Surfaces::has_coloured_tint() const {
   if (!effects.has(Effect::kColor)) return false;
-  const auto is_grey = [](Vec3 v) { return v.x == v.y && v.y == v.z; };
   std::vector<std::uint8_t> is_used(materials.size(), 0);
   for (const Mesh& mesh : scene->meshes) is_used[mesh.material] = 1;
   for (std::size_t m = 0; m < materials.size(); ++m) {

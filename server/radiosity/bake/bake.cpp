@@ -258,7 +258,7 @@ double gather_rays(const BakePlan& plan) {
 }  // namespace
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
-                               std::stop_token stop) {
+                               std::stop_token stop, std::stop_token finish) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   // An arena of more threads than cores is allowed: results do not depend on the number.
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));

@@ -22,6 +22,10 @@ struct BakeProgress {
   std::uint64_t steps_total = 0;  ///< 0: not known
   double seconds_left = -1;       ///< estimate; negative: not known yet
   double residual = 0;            ///< kSolving: relative error bound so far
+  int pass = 0;
+  double relative_error = 0;  ///< estimated relative RMSE of the map as the passes so far left it; 0: not known yet
+  double relative_error_low = 0, relative_error_high = 0;  ///< its 95 % interval
+  double asked_error = 0;
 };
 
 /// A finished rectangle of a layer. Shapes: values [height * width * channels], rows from the top.
@@ -92,6 +96,31 @@ struct VertexSummary {
   std::uint64_t num_groups = 0, num_groups_filled = 0, num_copies = 0;
 };
 
+/// Field for field radbake.v1.ErrorReport, where the fields are explained.
+struct ErrorSummary {
+  double relative_rmse = 0, interval_low = 0, interval_high = 0;
+  double algebraic = 0, sampling = 0, discretisation = 0;
+  struct Worst {
+    double error = 0;
+    int lightmap = 0, x = 0, y = 0;
+    std::string mesh;
+  };
+  Worst worst;
+  double asked = 0, predicted = 0;
+  bool is_reached = false;
+  std::string limited_by;
+  std::uint64_t num_texels = 0;
+};
+
+/// Field for field radbake.v1.PassReport and PassSeconds, where the fields are explained.
+struct PassSummary {
+  std::uint64_t num_patches = 0;
+  int rays_per_row = 0, rays_per_texel = 0, light_samples_per_texel = 0;
+  std::uint64_t num_gathered = 0, num_row_rays = 0, num_gather_rays = 0, num_light_rays = 0;
+  double relative_rmse = 0, interval_low = 0, interval_high = 0;
+  double seconds = 0, cpu_seconds = 0;  ///< since the bake began; may differ between equal bakes
+};
+
 struct StageTime {
   std::string stage;
   double seconds = 0;
@@ -108,6 +137,8 @@ struct BakeReport {
   TransportSummary transport;
   LightmapSummary lightmap;
   VertexSummary vertices;
+  ErrorSummary error;
+  std::vector<PassSummary> passes;
   std::vector<Warning> warnings;
   std::vector<StageTime> stages;
   Prediction prediction;
@@ -141,10 +172,12 @@ Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, s
 
 /// Bakes a scene: plan, patches, direct light, rows, solve, gather.
 ///
-/// The result is a function of scene and options alone, bit for bit, for any number of threads.
+/// The result is a function of scene and options alone, bit for bit, for any number of threads; with a time budget, or
+/// when `finish` is requested, of the passes too that the report tells.
 /// Units:  metres, nit, cd, lx in; irradiance in lx out.
 /// Errors: as plan_scene; kCancelled when stop was requested; kInternal when the solver did not converge.
+/// `finish`, when requested, ends the bake with the best that it has: at the end of the first pass, or at once later.
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
-                               std::stop_token stop = {});
+                               std::stop_token stop = {}, std::stop_token finish = {});
 
 }  // namespace radbake::radiosity

@@ -90,7 +90,9 @@ double DirectLight::emitted_lumens() const {
 }
 
 std::uint64_t DirectLight::estimate(std::span<const Site> sites, std::span<const std::uint8_t> is_buried,
-                                    std::uint64_t seed, Scratch& scratch, std::span<Vec3> replicates) const {
+                                    std::uint64_t seed, Scratch& scratch, std::span<Vec3> replicates,
+                                    int samples) const {
+  const auto num_samples = static_cast<std::size_t>(samples > 0 ? samples : points_.size());
   RADBAKE_CHECK_EQ(sites.size(), is_buried.size());
   std::fill(replicates.begin(), replicates.end(), Vec3{});
   std::vector<const Site*> open;
@@ -102,16 +104,16 @@ std::uint64_t DirectLight::estimate(std::span<const Site> sites, std::span<const
   scratch.segments.clear();
   scratch.contributions.clear();
   scratch.replicate_of.clear();
-  if (!emitters_.empty()) sample_emitters(open, seed, scratch, replicates.size());
+  if (!emitters_.empty()) sample_emitters(open, seed, scratch, replicates.size(), num_samples);
   sample_lamps(open, scratch, replicates.size());
   std::uint64_t purpose = 0;
   for (const Light& light : surfaces_.lights) {
     const auto* sun = std::get_if<DirectionalLight>(&light.kind);
     if (sun == nullptr || !has_disc(*sun)) continue;
-    sample_sun(*sun, open, seed_of(seed, kSun, purpose++), scratch, replicates.size());
+    sample_sun(*sun, open, seed_of(seed, kSun, purpose++), scratch, replicates.size(), num_samples);
   }
   if (has_sampled_environment()) {
-    sample_environment(open, seed_of(seed, kEnvironment, 0), scratch, replicates.size());
+    sample_environment(open, seed_of(seed, kEnvironment, 0), scratch, replicates.size(), num_samples);
   }
 
   if (visibility_.is_see_through()) {
@@ -131,7 +133,7 @@ std::uint64_t DirectLight::estimate(std::span<const Site> sites, std::span<const
 }
 
 void DirectLight::sample_emitters(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
-                                  std::size_t num_replicates) const {
+                                  std::size_t num_replicates, std::size_t num_samples) const {
   // Weigh the emitters at the middle of the receiver: power over squared distance, never zero.
   std::span<const double> cumulative = cumulative_power_;
   if (emitters_.size() > 1 && emitters_.size() <= kMaxWeighedEmitters) {
@@ -148,7 +150,7 @@ void DirectLight::sample_emitters(const std::vector<const Site*>& sites, std::ui
     cumulative = scratch.cumulative;
   }
 
-  const std::size_t samples = static_cast<std::size_t>(points_.size()) / num_replicates;
+  const std::size_t samples = num_samples / num_replicates;
   for (std::size_t r = 0; r < num_replicates; ++r) {
     const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + r));
     for (std::size_t k = 0; k < samples; ++k) {
@@ -235,10 +237,10 @@ void DirectLight::add_ray(const Site& site, Vec3 direction, Vec3 contribution, s
 }
 
 void DirectLight::sample_sun(const DirectionalLight& sun, const std::vector<const Site*>& sites, std::uint64_t seed,
-                             Scratch& scratch, std::size_t num_replicates) const {
+                             Scratch& scratch, std::size_t num_replicates, std::size_t num_samples) const {
   const Frame towards(-sun.direction);
   const double sine = std::sin(sun.angular_diameter_radians / 2);
-  const std::size_t samples = std::max<std::size_t>(1, static_cast<std::size_t>(points_.size()) / 2 / num_replicates);
+  const std::size_t samples = std::max<std::size_t>(1, num_samples / 2 / num_replicates);
   for (std::size_t r = 0; r < num_replicates; ++r) {
     const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + r));
     for (std::size_t k = 0; k < samples; ++k) {
@@ -255,8 +257,8 @@ void DirectLight::sample_sun(const DirectionalLight& sun, const std::vector<cons
 }
 
 void DirectLight::sample_environment(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
-                                     std::size_t num_replicates) const {
-  const std::size_t samples = static_cast<std::size_t>(points_.size()) / num_replicates;
+                                     std::size_t num_replicates, std::size_t num_samples) const {
+  const std::size_t samples = num_samples / num_replicates;
   for (std::size_t r = 0; r < num_replicates; ++r) {
     const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + r));
     for (std::size_t k = 0; k < samples; ++k) {

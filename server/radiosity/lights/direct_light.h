@@ -49,10 +49,11 @@ class DirectLight {
   };
 
   /// Estimates irradiance as independent replicates, each with its share of the samples; their mean is the estimate.
-  /// Shapes: sites [n], is_buried [n] (buried sites are left out), replicates [r], r divides samples().
+  /// Shapes: sites [n], is_buried [n] (buried sites are left out), replicates [r].
+  /// `samples`: of all replicates, a multiple of r and at most samples(); 0: samples().
   /// Returns the number of shadow rays.
   std::uint64_t estimate(std::span<const Site> sites, std::span<const std::uint8_t> is_buried, std::uint64_t seed,
-                         Scratch& scratch, std::span<Vec3> replicates) const;
+                         Scratch& scratch, std::span<Vec3> replicates, int samples = 0) const;
 
   /// Lumens that the emitters and lamps send out, mean of the three channels; suns do not count.
   double emitted_lumens() const;
@@ -67,12 +68,12 @@ class DirectLight {
   /// Mean exitance of an emitter with its holes.
   Vec3 sent_by(std::uint32_t triangle) const;
   void sample_emitters(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
-                       std::size_t num_replicates) const;
+                       std::size_t num_replicates, std::size_t num_samples) const;
   void sample_lamps(const std::vector<const Site*>& sites, Scratch& scratch, std::size_t num_replicates) const;
   void sample_sun(const DirectionalLight& sun, const std::vector<const Site*>& sites, std::uint64_t seed,
-                  Scratch& scratch, std::size_t num_replicates) const;
+                  Scratch& scratch, std::size_t num_replicates, std::size_t num_samples) const;
   void sample_environment(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
-                          std::size_t num_replicates) const;
+                          std::size_t num_replicates, std::size_t num_samples) const;
   bool has_sampled_environment() const { return environment_ && !environment_->is_empty(); }
   /// A ray into the open that brings `contribution` where nothing blocks it.
   void add_ray(const Site& site, Vec3 direction, Vec3 contribution, std::size_t replicate, Scratch& scratch) const;

@@ -38,6 +38,8 @@ struct BakeOptions {
   int atlas_size = 0;           ///< texels along a side, 64..4096; 0: as small as holds the scene at texels_per_meter
   double texels_per_meter = 0;  ///< 0: 32
   int rays = 0;                 ///< hemisphere rays a texel; a patch's row gets the same
+  int light_samples = 0;        ///< shadow rays to emitters, a texel
+  int spacing = 0;              ///< texels from one that gathers indirect light to the next; 1: all do
   int max_patches = 0;
   std::uint64_t seed = 0;
   LightmapUv lightmap_uv = LightmapUv::kAuto;
@@ -50,7 +52,9 @@ struct BakeOptions {
   bool wants_direct = false, wants_indirect = false, wants_ao = false;  ///< lightmaps beside the one of all light
   double ao_distance = 0;                                               ///< metres; 0: 1
   int threads = 0;                                                      ///< 0: all cores; changes no result
-  HostCosts costs = {};  ///< as earlier bakes measured them; changes no result
+  double max_error = 0;            ///< relative RMSE to reach, as a fraction; 0: none asked
+  double time_budget_seconds = 0;  ///< from the start of the bake to the last tile; 0: none
+  HostCosts costs = {};            ///< as earlier bakes measured them; changes no result
 };
 
 /// What a bake will do. Field for field radbake.v1.Plan.

@@ -165,7 +165,10 @@ Result<ConvergenceStudy> study_convergence_of(const Scene& scene, const radiosit
         "solvers are compared on one matrix, and a streamed operator has two, one of rows and one of columns: choose "
         "--transport sparse or dense, or fewer --max-patches");
   }
-  RADBAKE_ASSIGN_OR_RETURN(const auto system, radiosity::make_radiosity_system(*prepared, options.seed, 0, {}, {}));
+  RADBAKE_ASSIGN_OR_RETURN(
+      const auto system,
+      radiosity::make_radiosity_system(
+          *prepared, {options.seed, prepared->plan.rays_per_row, radiosity::kLightSamplesPerPatch}, 0, {}, {}));
   return study_convergence(*system->transport, system->problem, tolerance);
 }
 

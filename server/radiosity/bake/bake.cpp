@@ -3,37 +3,23 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
-#include <limits>
 #include <optional>
 #include <thread>
 
 #include "server/radiosity/bake/lightmap_layers.h"
+#include "server/radiosity/bake/patch_light.h"
 #include "server/radiosity/bake/pilot.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
-#include "server/radiosity/bake/radiosity_system.h"
-#include "server/radiosity/error/energy.h"
 #include "server/radiosity/gather/gather.h"
 #include "server/radiosity/gather/gather_vertices.h"
-#include "server/radiosity/solve/solve.h"
 
 namespace radbake::radiosity {
 namespace {
 
-Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
+enum Purpose : std::uint64_t { kReplicate = 71 };
 
-/// The course of a solve in so many points that a plot looks the same.
-std::vector<SolverSummary::Point> thinned(const std::vector<SolveStep>& history) {
-  constexpr std::size_t kMostPoints = 100;
-  std::vector<SolverSummary::Point> points;
-  const std::size_t step = history.size() / kMostPoints + 1;
-  for (std::size_t k = 0; k < history.size(); ++k) {
-    if (k % step != 0 && k + 1 != history.size()) continue;
-    points.push_back({static_cast<std::uint64_t>(history[k].steps), static_cast<std::uint64_t>(history[k].work),
-                      history[k].residual, history[k].relative_error_bound});
-  }
-  return points;
-}
+Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
 /// One bake, stage after stage, on the threads of the arena that it runs in.
 class Bake {
@@ -54,33 +40,27 @@ class Bake {
 
     outcome_.report.instruction_set = prepared_.visibility->instruction_set();
     const int num_channels = num_ray_channels_;
-    RADBAKE_ASSIGN_OR_RETURN(auto systems, make_systems());
-    std::vector<Vec3> radiosity(prepared_.patches.size()), glow(radiosity);
-    for (int channel = 0; channel < num_channels; ++channel) {
-      const auto system = std::move(systems[static_cast<std::size_t>(channel)]);
-      RADBAKE_ASSIGN_OR_RETURN(const std::vector<Vec3> own, radiosity_of(*system));
-      for (std::size_t i = 0; i < radiosity.size(); ++i) {
-        for (int c = channel; c < (num_channels == 1 ? 3 : channel + 1); ++c) {
-          radiosity[i][c] = own[i][c];
-          glow[i][c] = system->glow[i][c];
-        }
-      }
+    RADBAKE_ASSIGN_OR_RETURN(const std::vector<PatchLight> patch_light, solve_replicates());
+    std::vector<SentLight> sent;
+    for (int r = 0; r < kMaxReplicates; ++r) {
+      const PatchLight& own = patch_light[static_cast<std::size_t>(r) % patch_light.size()];
+      sent.push_back(
+          {own.radiosity, options_.wants_direct || options_.wants_indirect ? own.glow : std::span<const Vec3>{}});
     }
-    if (!options_.wants_direct && !options_.wants_indirect) glow = {};
 
     const DirectLight direct(surfaces_, prepared_.shadows(), kLightSamplesPerTexel, Environment::Part::kBright);
     const double ao_distance = options_.ao_distance > 0 ? options_.ao_distance : kDefaultAoDistance;
     std::vector<HemisphereEstimator> rows;
     for (int channel = 0; channel < num_channels; ++channel) {
       rows.emplace_back(surfaces_, prepared_.patches, prepared_.visibility->channel(channel),
-                        prepared_.plan.rays_per_texel, options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0);
+                        prepared_.plan.rays_per_texel, options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0,
+                        kMaxReplicates);
     }
     const GatherScene scene{surfaces_,
                             prepared_.shadows(),
                             rows[0],
                             direct,
-                            radiosity,
-                            glow,
+                            sent,
                             surfaces_.sky,
                             options_.seed,
                             std::span(rows).subspan(1),
@@ -91,93 +71,45 @@ class Bake {
   }
 
  private:
-  /// The rows of each channel that see-through surfaces tell apart.
-  Result<std::vector<std::unique_ptr<RadiositySystem>>> make_systems() {
+  /// The replicates of the patches' light: several where rows are sampled.
+  Result<std::vector<PatchLight>> solve_replicates() {
     BakeReport& report = outcome_.report;
-    std::vector<std::unique_ptr<RadiositySystem>> systems;
-    for (int channel = 0; channel < num_ray_channels_; ++channel) {
-      const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
-        const auto before = total * static_cast<std::uint64_t>(channel);
-        progress_.report(BakeStage::kFormFactors, before + done, total * static_cast<std::uint64_t>(num_ray_channels_));
-      };
-      RADBAKE_ASSIGN_OR_RETURN(auto system, make_radiosity_system(prepared_, options_.seed, channel, on_row, stop_));
-      if (num_ray_channels_ > 1) keep_channel(channel, *system);
-      report.num_row_rays += system->num_row_rays;
-      report.num_light_rays += system->num_light_rays;
+    const int num = num_replicates_of(report.plan.form_factors);
+    const auto total_num = static_cast<std::uint64_t>(num);
+    std::vector<ReplicateSystem> systems;
+    for (int r = 0; r < num; ++r) {
+      const auto index = static_cast<std::uint64_t>(r);
+      const SystemSettings settings{seed_of(options_.seed, kReplicate, index), report.plan.rays_per_row / num,
+                                    kLightSamplesPerPatch / num};
+      RADBAKE_ASSIGN_OR_RETURN(ReplicateSystem system, estimate_system(
+                                                           prepared_, settings,
+                                                           [&](std::uint64_t done, std::uint64_t total) {
+                                                             progress_.report(BakeStage::kFormFactors,
+                                                                              total * index + done, total * total_num);
+                                                           },
+                                                           stop_));
+      report.num_row_rays += system.report.num_row_rays;
+      report.num_light_rays += system.report.num_light_rays;
       systems.push_back(std::move(system));
     }
-    // Of several channels, the report shows the first.
-    report.transport = systems.front()->summary;
-    const std::vector<Warning>& warnings = systems.front()->warnings;
-    report.warnings.insert(report.warnings.end(), warnings.begin(), warnings.end());
-    return systems;
-  }
-
-  /// What the patches send. Shapes: [patches], lx.
-  Result<std::vector<Vec3>> radiosity_of(const RadiositySystem& system) {
-    if (system.transport) return solve(system);
-    outcome_.report.solver.solver = "none";
-    outcome_.report.solver.status = "converged";
-    return system.glow;
-  }
-
-  /// The system of a channel: the other two become copies of it.
-  static void keep_channel(int channel, RadiositySystem& system) {
-    for (auto* values : {&system.problem.source, &system.problem.reflectance, &system.glow, &system.direct}) {
-      for (Vec3& value : *values) value = Vec3{1, 1, 1} * value[channel];
-    }
-  }
-
-  /// System -> radiosity, with the report's transport, solver and energy.
-  Result<std::vector<Vec3>> solve(const RadiositySystem& system) {
-    BakeReport& report = outcome_.report;
     progress_.report(BakeStage::kSolving, 0, 0);
-    SolveOptions options;
-    options.max_sweeps = max_sweeps_of(report.plan.survey.max_reflectance, options.relative_tolerance);
-    options.max_lu_patches = std::numeric_limits<std::size_t>::max();  // never chosen but by name
-    std::vector<Vec3> radiosity = system.problem.source;
-    const auto show = [this](const auto& view) {
-      progress_.report(BakeStage::kSolving, static_cast<std::uint64_t>(view.step.steps), 0,
-                       view.step.relative_error_bound);
-    };
-    // Where all is grey, and where each channel has rows of its own, one stands for three.
-    const bool is_grey = report.plan.num_channels == 1 || num_ray_channels_ > 1;
-    const Solver solver = report.plan.solver;
-    RADBAKE_ASSIGN_OR_RETURN(
-        const SolveReport solved,
-        is_grey ? solve_grey(solver, *system.transport, system.problem, options, radiosity, show, stop_)
-                : radiosity::solve(solver, *system.transport, system.problem, options, radiosity, show, stop_));
-    report.solver = {solver_name(solved.solver),
-                     solve_status_name(solved.status),
-                     solved.sweeps,
-                     solved.residual,
-                     solved.error_bound,
-                     solved.relative_error_bound,
-                     options.relative_tolerance,
-                     thinned(solved.history)};
-    if (stop_.stop_requested() || solved.status == SolveStatus::kCancelled) return cancelled();
-    if (solved.status != SolveStatus::kConverged) {
-      return internal_error("the solver " + report.solver.solver + " did not converge (" + report.solver.status +
-                            " after " + std::to_string(solved.sweeps) + " sweeps, residual " +
-                            std::to_string(solved.residual) +
-                            " lx): the scene passes on nearly all of its light; lower the largest reflectance, " +
-                            std::to_string(report.plan.survey.max_reflectance) + ", or choose another --solver");
+    std::vector<PatchLight> light;
+    for (ReplicateSystem& system : systems) {
+      RADBAKE_ASSIGN_OR_RETURN(PatchLight own, solve_patch_light(
+                                                   prepared_, system,
+                                                   [&](std::uint64_t steps, double bound) {
+                                                     progress_.report(BakeStage::kSolving, steps, 0, bound);
+                                                   },
+                                                   stop_));
+      light.push_back(std::move(own));
     }
-    EnergyTerms terms{radiosity, system.problem.reflectance, system.glow, system.direct, system.direct_variances};
-    terms.light_flux = system.emitted_lumens;
-    // Of a channel by itself the flux of the lights is not known.
-    terms.is_closed =
-        report.transport.escape_share == 0 && report.transport.absorbed_share == 0 && num_ray_channels_ == 1;
-    const EnergyBalance balance = audit_energy(*system.transport, terms);
-    report.energy = {balance.is_closed,
-                     balance.emitted,
-                     balance.absorbed,
-                     balance.gap,
-                     balance.gap_standard_error,
-                     balance.escaped,
-                     balance.transported_relative_gap,
-                     0};
-    return radiosity;
+    // Of several replicates, the report shows the first.
+    const PatchLightReport& first = systems.front().report;
+    report.transport = first.transport;
+    report.solver = first.solver;
+    report.energy = first.energy;
+    report.warnings.insert(report.warnings.end(), first.warnings.begin(), first.warnings.end());
+    return light;
   }
 
   /// Radiosity -> lightmaps and light by vertex; false when it was stopped.

@@ -88,14 +88,14 @@ class Pilot {
   explicit Pilot(const Preparation& prepared)
       : prepared_(prepared),
         surfaces_(prepared.surveyed.surfaces),
-        rows_(surfaces_, prepared.patches, *prepared.visibility, prepared.plan.rays_per_texel),
+        rows_(surfaces_, prepared.patches, *prepared.visibility, prepared.plan.rays_per_texel, 0, kMaxReplicates),
         patch_light_(surfaces_, prepared.shadows(), kLightSamplesPerPatch),
         texel_light_(surfaces_, prepared.shadows(), kLightSamplesPerTexel, Environment::Part::kBright),
         // Light everywhere: none would take the path of what is sealed.
         radiosity_(prepared.patches.size(), Vec3{1, 1, 1}),
         site_points_(rows_.num_sites()) {
     if (surfaces_.effects.has(Effect::kInterreflection)) {
-      row_estimator_ = make_row_estimator(prepared, 0);
+      row_estimator_ = make_row_estimator(prepared, prepared.plan.rays_per_row, 0);
       sampler_.emplace(surfaces_, prepared.patches, *row_estimator_, patch_light_, prepared.options.seed);
     }
   }
@@ -129,7 +129,8 @@ class Pilot {
 
   /// Empty: the texel covers nothing.
   std::optional<Trial> try_receiver(std::size_t index, Footprint& footprint, ReceiveScratch& scratch) const {
-    const GatherScene scene{surfaces_,     prepared_.shadows(),   rows_, texel_light_, radiosity_, {},
+    const std::vector<SentLight> sent(kMaxReplicates, {radiosity_});
+    const GatherScene scene{surfaces_,     prepared_.shadows(),   rows_, texel_light_, sent,
                             surfaces_.sky, prepared_.options.seed};
     const double start = thread_cpu_seconds();
     if (!place_sites(index, footprint, scratch)) return std::nullopt;

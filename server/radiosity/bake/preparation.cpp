@@ -117,7 +117,8 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   if (prepared->groups) plan.num_vertex_groups = prepared->groups->size();
   plan.num_patches = prepared->patches.size();
   plan.rays_per_texel = options.rays > 0 ? options.rays : kDefaultRays;
-  plan.rays_per_row = plan.rays_per_texel;
+  // Each replicate of a row has enough to tell what is buried.
+  plan.rays_per_row = std::max(plan.rays_per_texel, kMinRays * num_replicates_of(FormFactors::kHemisphere));
   plan.light_samples_per_texel =
       std::count(surfaces.is_emitter.begin(), surfaces.is_emitter.end(), 1) > 0 ? kLightSamplesPerTexel : 0;
   choose_methods(options, plan);

@@ -16,7 +16,7 @@
 
 namespace radbake::radiosity {
 
-std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, int channel) {
+std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, int rays_per_row, int channel) {
   const Surfaces& surfaces = prepared.surveyed.surfaces;
   const Patches& patches = prepared.patches;
   const Visibility& visibility = prepared.visibility->channel(channel);
@@ -27,11 +27,11 @@ std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, in
                                                  plan.transport != Transport::kStreamed);
     case FormFactors::kHemicube: return std::make_unique<HemicubeEstimator>(surfaces, patches, visibility);
     case FormFactors::kAdaptive:
-      return std::make_unique<AdaptiveEstimator>(surfaces, patches, visibility, plan.rays_per_row);
+      return std::make_unique<AdaptiveEstimator>(surfaces, patches, visibility, rays_per_row);
     case FormFactors::kAuto:
     case FormFactors::kHemisphere: break;
   }
-  return std::make_unique<HemisphereRows>(surfaces, patches, visibility, plan.rays_per_row);
+  return std::make_unique<HemisphereRows>(surfaces, patches, visibility, rays_per_row);
 }
 
 namespace {
@@ -180,15 +180,15 @@ std::unique_ptr<TransportOperator> make_streamed(const EstimatedRows& rows, cons
 }  // namespace
 
 Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
-    const Preparation& prepared, std::uint64_t seed, int channel,
+    const Preparation& prepared, const SystemSettings& settings, int channel,
     const std::function<void(std::uint64_t, std::uint64_t)>& on_row, std::stop_token stop) {
   const Surfaces& surfaces = prepared.surveyed.surfaces;
   const Patches& patches = prepared.patches;
   auto system = std::make_unique<RadiositySystem>();
-  system->estimator = make_row_estimator(prepared, channel);
-  system->direct_light = std::make_unique<DirectLight>(surfaces, prepared.shadows(), kLightSamplesPerPatch);
-  system->sampler =
-      std::make_unique<PatchSampler>(surfaces, patches, *system->estimator, *system->direct_light, seed, channel);
+  system->estimator = make_row_estimator(prepared, settings.rays_per_row, channel);
+  system->direct_light = std::make_unique<DirectLight>(surfaces, prepared.shadows(), settings.light_samples);
+  system->sampler = std::make_unique<PatchSampler>(surfaces, patches, *system->estimator, *system->direct_light,
+                                                   settings.seed, channel);
   system->emitted_lumens = system->direct_light->emitted_lumens();
   if (!surfaces.effects.has(Effect::kInterreflection)) {
     fill_glow(patches.size(), *system);

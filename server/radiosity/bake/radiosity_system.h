@@ -33,8 +33,15 @@ struct RadiositySystem {
   std::unique_ptr<PatchSampler> sampler;
 };
 
+/// What one replicate of the system is estimated with.
+struct SystemSettings {
+  std::uint64_t seed = 0;
+  int rays_per_row = 0;
+  int light_samples = 0;  ///< shadow rays to emitters, a patch
+};
+
 /// The estimator of a plan's rows, as a channel of what is see-through meets the scene.
-std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, int channel);
+std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, int rays_per_row, int channel);
 
 /// Estimates the rows of a prepared scene and puts the operator together. `channel`: of what is see-through; 0 where
 /// all channels meet the same.
@@ -43,7 +50,7 @@ std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, in
 /// on_row as in sample_patches(). A streamed operator stops estimating when `stop` is requested, later on too.
 /// Errors: kCancelled.
 Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
-    const Preparation& prepared, std::uint64_t seed, int channel,
+    const Preparation& prepared, const SystemSettings& settings, int channel,
     const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row, std::stop_token stop);
 
 }  // namespace radbake::radiosity

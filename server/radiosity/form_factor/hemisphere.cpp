@@ -12,19 +12,22 @@ constexpr int kRaysPerSite = 8;
 }  // namespace
 
 int HemisphereEstimator::num_sites() const {
-  int sites = 1;
+  int sites = replicates_;
   while (2 * sites <= kMaxSites && 2 * sites * kRaysPerSite <= rays()) sites *= 2;
   return sites;
 }
 
 void HemisphereEstimator::deal_rays(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch) const {
-  directions_.fill(seed, scratch.directions);
-  const auto num_rays = static_cast<std::size_t>(rays());
-  scratch.rays.resize(num_rays);
+  const auto num_replicates = static_cast<std::size_t>(replicates_);
+  const std::size_t num_rays = static_cast<std::size_t>(rays()) / num_replicates;
+  const std::size_t num_sites = sites.size() / num_replicates;
+  scratch.rays.resize(num_rays * num_replicates);
   scratch.end_of_site.clear();
-  const float *x = scratch.directions.x.data(), *y = scratch.directions.y.data(), *z = scratch.directions.z.data();
   Ray* ray = scratch.rays.data();
   for (std::size_t s = 0; s < sites.size(); ++s) {
+    const std::size_t own = s % num_sites;  // within its replicate
+    if (own == 0) directions_.fill(replicates_ == 1 ? seed : mixed_bits(seed + s / num_sites), scratch.directions);
+    const float *x = scratch.directions.x.data(), *y = scratch.directions.y.data(), *z = scratch.directions.z.data();
     const Site& site = sites[s];
     const Frame frame(site.normal);
     const auto origin = lifted_origin(surfaces_, site.position, site.facing, site.point.triangle);
@@ -33,8 +36,8 @@ void HemisphereEstimator::deal_rays(std::span<const Site> sites, std::uint64_t s
     };
     const auto along_x = in_float(frame.s), along_y = in_float(frame.t), along_z = in_float(frame.n);
     const auto facing = in_float(site.facing);
-    const std::size_t end = (s + 1) * num_rays / sites.size();
-    for (std::size_t k = s * num_rays / sites.size(); k < end; ++k) {
+    const std::size_t end = (own + 1) * num_rays / num_sites;
+    for (std::size_t k = own * num_rays / num_sites; k < end; ++k) {
       ray->origin = origin;
       for (int axis = 0; axis < 3; ++axis) {
         ray->direction[axis] = along_x[axis] * x[k] + along_y[axis] * y[k] + along_z[axis] * z[k];

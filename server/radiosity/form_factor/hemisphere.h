@@ -45,15 +45,19 @@ struct RowSample {
 class HemisphereEstimator {
  public:
   /// `near_distance`: rays that meet anything within are counted apart, scene units; 0: none.
+  /// `replicates`: that a row consists of, independent of each other, each with its share of the sites and of the rays,
+  /// both multiples of their number.
   HemisphereEstimator(const Surfaces& surfaces, const Patches& patches, const Visibility& visibility, int rays,
-                      double near_distance = 0)
+                      double near_distance = 0, int replicates = 1)
       : surfaces_(surfaces),
         patches_(patches),
         visibility_(visibility),
-        directions_(rays),
-        near_distance_(static_cast<float>(near_distance)) {}
+        directions_(rays / replicates),
+        near_distance_(static_cast<float>(near_distance)),
+        replicates_(replicates) {}
 
-  int rays() const { return directions_.size(); }
+  int rays() const { return directions_.size() * replicates_; }
+  int replicates() const { return replicates_; }
   /// How many sites a receiver should have for this number of rays.
   int num_sites() const;
 
@@ -67,7 +71,8 @@ class HemisphereEstimator {
     std::vector<std::uint8_t> wanted;
   };
 
-  /// Traces one row. Shapes: sites [n], n >= 1.
+  /// Traces one row. Shapes: sites [n], n >= 1 and a multiple of replicates(): replicate r has those from r n /
+  /// replicates().
   void sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, RowSample& row) const;
 
   /// The same rays as the last sample_row() with this scratch, as this estimator's channel meets them; only those are
@@ -83,6 +88,7 @@ class HemisphereEstimator {
   const Visibility& visibility_;
   CosineDirections directions_;
   float near_distance_;
+  int replicates_;
 };
 
 }  // namespace radbake::radiosity

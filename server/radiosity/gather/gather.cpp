@@ -47,17 +47,21 @@ Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoin
   const std::uint64_t id = static_cast<std::uint64_t>(y) * atlas.width() + x;
 
   // Spread the sites over the footprint.
-  const auto seeds = SobolPoints::seeds_of(seed_of(scene.seed, kSitesOfTexel, id));
   scratch.receive.sites.clear();
-  for (int s = 0; s < site_points.size(); ++s) {
-    const SurfacePoint p =
-        scratch.footprint.sample(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds));
-    scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
+  for (int r = 0; r < scene.rows.replicates(); ++r) {
+    const auto seeds =
+        SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfTexel, id) + static_cast<std::uint64_t>(r)));
+    for (int s = 0; s < site_points.size(); ++s) {
+      const SurfacePoint p =
+          scratch.footprint.sample(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds));
+      scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
+    }
   }
   const Reception reception =
       receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
-  texel.irradiance = reception.irradiance;
-  texel.indirect = reception.indirect;
+  const ReceivedLight light = reception.mean(scene.rows.replicates());
+  texel.irradiance = light.irradiance();
+  texel.indirect = light.reflected;
   texel.openness = reception.openness;
   texel.state = reception.is_buried ? TexelState::kBuried : TexelState::kValid;
   texel.rays = reception.rays;
@@ -73,7 +77,7 @@ GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas, Gather
   const int edge = std::max(width, height) > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
   const int tiles_across = (width + edge - 1) / edge, tiles_down = (height + edge - 1) / edge;
   const std::size_t num_texels = static_cast<std::size_t>(atlas.num_rows()) * width;
-  const SobolPoints site_points(scene.rows.num_sites());
+  const SobolPoints site_points(scene.rows.num_sites() / scene.rows.replicates());
 
   GatheredMap map;
   map.rgba.assign(num_texels * 4, 0.0f);

@@ -76,7 +76,7 @@ GatheredVertices gather_vertices(const GatherScene& scene, const VertexGroups& g
   GatheredVertices out;
   out.irradiance.resize(groups.size());
   std::vector<std::uint8_t> is_known(groups.size(), 0);
-  const SobolPoints site_points(scene.rows.num_sites());
+  const SobolPoints site_points(scene.rows.num_sites() / scene.rows.replicates());
   std::atomic<std::uint64_t> num_done = 0, num_rays = 0, num_light_rays = 0;
   for_each_range(groups.size(), kGroupsPerTask, [&](std::size_t begin, std::size_t end) {
     Scratch scratch;
@@ -89,16 +89,19 @@ GatheredVertices gather_vertices(const GatherScene& scene, const VertexGroups& g
         area += scene.surfaces.areas[groups.corners[c] / 3];
         scratch.area_up_to.push_back(area);
       }
-      const auto seeds = SobolPoints::seeds_of(seed_of(scene.seed, kSitesOfVertex, g));
       scratch.receive.sites.clear();
-      for (int s = 0; s < site_points.size(); ++s) {
-        const SurfacePoint p = sample_near(groups, g, scratch.area_up_to, site_points.coordinate(s, 0, seeds),
-                                           site_points.coordinate(s, 1, seeds));
-        scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
+      for (int r = 0; r < scene.rows.replicates(); ++r) {
+        const auto seeds =
+            SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfVertex, g) + static_cast<std::uint64_t>(r)));
+        for (int s = 0; s < site_points.size(); ++s) {
+          const SurfacePoint p = sample_near(groups, g, scratch.area_up_to, site_points.coordinate(s, 0, seeds),
+                                             site_points.coordinate(s, 1, seeds));
+          scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
+        }
       }
       const Reception reception = receive(scene, seed_of(scene.seed, kRaysOfVertex, g),
                                           seed_of(scene.seed, kLightOfVertex, g), scratch.receive);
-      out.irradiance[g] = reception.irradiance;
+      out.irradiance[g] = reception.mean(scene.rows.replicates()).irradiance();
       is_known[g] = !reception.is_buried;
       num_rays += reception.rays;
       num_light_rays += reception.light_rays;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 namespace radbake::radiosity {
 namespace {
@@ -14,12 +15,18 @@ constexpr double kMinVisibleShare = 0.125;
 constexpr double kRetracedShare = 0.5;
 constexpr std::uint32_t kNoPart = std::numeric_limits<std::uint32_t>::max();
 
+/// Sites of one replicate.
+std::size_t sites_each(const GatherScene& scene, const ReceiveScratch& scratch) {
+  return scratch.sites.size() / static_cast<std::size_t>(scene.rows.replicates());
+}
+
 /// Whether no light that was reflected reaches a site, most of whose rays meet backs: the inside of something closed.
-bool looks_sealed(const GatherScene& scene, const RowSample& row, std::size_t site) {
-  const RowSample::SiteRays& own = row.of_site[site];
+bool looks_sealed(const GatherScene& scene, const ReceiveScratch& scratch, std::size_t site) {
+  const RowSample::SiteRays& own = scratch.row.of_site[site];
   if (own.escaped > 0 || 2 * own.backs <= own.counted) return false;
+  const std::span<const Vec3> radiosity = scene.sent[site / sites_each(scene, scratch)].radiosity;
   for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
-    if (max_component(scene.radiosity[row.arrivals[own.first_arrival + k]]) > scene.dark) return false;
+    if (max_component(radiosity[scratch.row.arrivals[own.first_arrival + k]]) > scene.dark) return false;
   }
   return true;
 }
@@ -29,7 +36,7 @@ void leave_out_sealed(const GatherScene& scene, std::uint64_t light_seed, Receiv
   std::vector<std::uint8_t> is_other(scratch.sites.size(), 1);
   bool is_any = false;
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
-    if (scratch.is_out[s] || !looks_sealed(scene, scratch.row, s)) continue;
+    if (scratch.is_out[s] || !looks_sealed(scene, scratch, s)) continue;
     is_other[s] = 0;
     is_any = true;
   }
@@ -122,24 +129,23 @@ class Parting {
   std::vector<std::uint32_t> targets_;
 };
 
-/// What the light at a receiver consists of.
-struct ReceivedLight {
-  Vec3 all, indirect;
-  double openness = 0;
-};
-
-/// What the patches and the sky send along the rays of a row, from the sites that are not out.
-ReceivedLight light_of_row(const GatherScene& scene, const RowSample& row, const ReceiveScratch& scratch) {
-  Vec3 sum, glow, sky;
-  std::uint64_t escaped = 0, counted = 0, near = 0;
+/// What the patches and the sky send along the rays of a replicate, from its sites that are not out. Without any,
+/// empty.
+std::optional<ReceivedLight> light_of_row(const GatherScene& scene, const RowSample& row, std::size_t replicate,
+                                          const ReceiveScratch& scratch) {
+  const SentLight& sent = scene.sent[replicate];
+  Vec3 sum, glow, sky, coarser;
+  std::uint64_t escaped = 0, counted = 0;
   const Environment* environment = scene.direct.environment();
-  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+  const std::size_t num_sites = sites_each(scene, scratch);
+  for (std::size_t s = replicate * num_sites; s < (replicate + 1) * num_sites; ++s) {
     if (scratch.is_out[s]) continue;
     const RowSample::SiteRays& own = row.of_site[s];
     for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
       const std::uint32_t patch = row.arrivals[own.first_arrival + k];
-      sum += scene.radiosity[patch];
-      if (!scene.glow.empty()) glow += scene.glow[patch];
+      sum += sent.radiosity[patch];
+      if (!sent.glow.empty()) glow += sent.glow[patch];
+      if (!sent.coarser.empty()) coarser += sent.coarser[patch];
     }
     for (std::uint32_t k = 0; k < own.escaped && environment != nullptr; ++k) {
       const auto& d = scratch.hemisphere.rays[row.escapes[own.first_escape + k]].direction;
@@ -147,37 +153,77 @@ ReceivedLight light_of_row(const GatherScene& scene, const RowSample& row, const
     }
     escaped += own.escaped;
     counted += own.counted;
-    near += own.near;
   }
-  if (counted == 0) return {};
+  if (counted == 0) return std::nullopt;
   const auto num = static_cast<double>(counted);
   sky += scene.sky * static_cast<double>(escaped);
-  return {(sum + sky * std::numbers::pi) / num, (sum - glow) / num, 1 - static_cast<double>(near) / num};
+  return ReceivedLight{(sum + sky * std::numbers::pi) / num,
+                       {},
+                       (sum - glow) / num,
+                       sent.coarser.empty() ? Vec3{} : (coarser - sum) / num};
+}
+
+/// Light of a channel with rows of its own in the place of the first one's.
+void put_channel(const ReceivedLight& from, int channel, ReceivedLight& to) {
+  to.gathered[channel] = from.gathered[channel];
+  to.reflected[channel] = from.reflected[channel];
+  to.coarser[channel] = from.coarser[channel];
 }
 
 /// The light at the sites that are not out, from the row that was traced for them. Of channels with rows of their own,
-/// the first says what counts.
-ReceivedLight light_of(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
-  ReceivedLight light = light_of_row(scene, scratch.row, scratch);
+/// the first says what counts. A replicate all of whose sites are out gets the others' mean.
+void light_of(const GatherScene& scene, std::uint64_t light_seed, int light_samples, ReceiveScratch& scratch,
+              Reception& out) {
+  const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
+  std::array<bool, kMaxReplicates> is_there{};
+  for (std::size_t r = 0; r < num_replicates; ++r) {
+    const auto light = light_of_row(scene, scratch.row, r, scratch);
+    is_there[r] = light.has_value();
+    out.replicates[r] = light.value_or(ReceivedLight{});
+  }
   for (std::size_t c = 0; c < scene.other_rows.size(); ++c) {
     scene.other_rows[c].sample_again(scratch.sites, scratch.hemisphere, scratch.other_row);
     out.rays += scratch.other_row.traced;
-    const ReceivedLight other = light_of_row(scene, scratch.other_row, scratch);
-    const int channel = static_cast<int>(c) + 1;
-    light.all[channel] = other.all[channel];
-    light.indirect[channel] = other.indirect[channel];
+    for (std::size_t r = 0; r < num_replicates; ++r) {
+      const auto light = light_of_row(scene, scratch.other_row, r, scratch);
+      if (light) put_channel(*light, static_cast<int>(c) + 1, out.replicates[r]);
+    }
+  }
+  const auto num_there = std::count(is_there.begin(), is_there.end(), true);
+  if (num_there > 0 && num_there < static_cast<std::ptrdiff_t>(num_replicates)) {
+    ReceivedLight sum;
+    for (std::size_t r = 0; r < num_replicates; ++r) {
+      sum.gathered += out.replicates[r].gathered;
+      sum.reflected += out.replicates[r].reflected;
+      sum.coarser += out.replicates[r].coarser;
+    }
+    const auto num = static_cast<double>(num_there);
+    for (std::size_t r = 0; r < num_replicates; ++r) {
+      if (!is_there[r]) out.replicates[r] = {sum.gathered / num, {}, sum.reflected / num, sum.coarser / num};
+    }
   }
 
   // Add what the lights send straight.
-  Vec3 direct;
-  out.light_rays +=
-      scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light, std::span(&direct, 1));
-  light.all += direct;
-  return light;
+  std::array<Vec3, kMaxReplicates> direct;
+  out.light_rays += scene.direct.estimate(scratch.sites, scratch.is_out, light_seed, scratch.light,
+                                          std::span(direct).first(num_replicates), light_samples);
+  for (std::size_t r = 0; r < num_replicates; ++r) out.replicates[r].direct = direct[r];
+}
+
+/// Share of the counted rays that meet nothing near, of all sites that are not out.
+double openness_of(const ReceiveScratch& scratch) {
+  std::uint64_t counted = 0, near = 0;
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    if (scratch.is_out[s]) continue;
+    counted += scratch.row.of_site[s].counted;
+    near += scratch.row.of_site[s].near;
+  }
+  return counted > 0 ? 1 - static_cast<double>(near) / static_cast<double>(counted) : 0;
 }
 
 /// Leaves all parts out but the darkest of those that are large enough to be measured.
-void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
+void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, int light_samples, ReceiveScratch& scratch,
+                       Reception& out) {
   const std::vector<std::uint32_t> sizes = Parting(scene, scratch).find_parts();
   if (sizes.size() <= 1) return;
   const std::vector<std::uint8_t> is_buried = scratch.is_out;
@@ -191,7 +237,8 @@ void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, Recei
   for (std::uint32_t part = 0; part < sizes.size(); ++part) {
     if (sizes[part] < kMinVisibleShare * static_cast<double>(scratch.sites.size())) continue;
     keep(part);
-    const double light = max_component(light_of(scene, light_seed, scratch, out).all);
+    light_of(scene, light_seed, light_samples, scratch, out);
+    const double light = max_component(out.mean(scene.rows.replicates()).irradiance());
     if (light >= least) continue;
     least = light;
     kept = part;
@@ -201,12 +248,12 @@ void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, Recei
 
 /// Traces the sites' rows and marks what does not count. Returns the share that does.
 double trace_and_sort_out(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
-                          ReceiveScratch& scratch, Reception& out) {
+                          int light_samples, ReceiveScratch& scratch, Reception& out) {
   scene.rows.sample_row(scratch.sites, rays_seed, scratch.hemisphere, scratch.row);
   out.rays += scratch.row.traced;
   scratch.is_out = scratch.row.is_buried;
   leave_out_sealed(scene, light_seed, scratch, out);
-  keep_darkest_part(scene, light_seed, scratch, out);
+  keep_darkest_part(scene, light_seed, light_samples, scratch, out);
   const auto num_out = std::count(scratch.is_out.begin(), scratch.is_out.end(), 1);
   return 1 - static_cast<double>(num_out) / static_cast<double>(scratch.sites.size());
 }
@@ -222,21 +269,30 @@ void repeat_visible_sites(ReceiveScratch& scratch) {
 
 }  // namespace
 
-Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
-                  ReceiveScratch& scratch) {
+ReceivedLight Reception::mean(int num_replicates) const {
+  ReceivedLight sum;
+  for (int r = 0; r < num_replicates; ++r) {
+    const ReceivedLight& own = replicates[static_cast<std::size_t>(r)];
+    sum.gathered += own.gathered / num_replicates;
+    sum.direct += own.direct / num_replicates;
+    sum.reflected += own.reflected / num_replicates;
+    sum.coarser += own.coarser / num_replicates;
+  }
+  return sum;
+}
+
+Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch,
+                  int light_samples) {
   Reception out;
   // Find the part that counts.
-  const double visible = trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
-  if (visible < kMinVisibleShare) return out;
-  if (visible < kRetracedShare) {
+  out.visible_share = trace_and_sort_out(scene, rays_seed, light_seed, light_samples, scratch, out);
+  if (out.visible_share < kMinVisibleShare) return out;
+  if (out.visible_share < kRetracedShare) {
     repeat_visible_sites(scratch);
-    trace_and_sort_out(scene, rays_seed, light_seed, scratch, out);
+    trace_and_sort_out(scene, rays_seed, light_seed, light_samples, scratch, out);
   }
-
-  const ReceivedLight light = light_of(scene, light_seed, scratch, out);
-  out.irradiance = light.all;
-  out.indirect = light.indirect;
-  out.openness = light.openness;
+  light_of(scene, light_seed, light_samples, scratch, out);
+  out.openness = openness_of(scratch);
   out.is_buried = false;
   return out;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,14 +11,23 @@
 
 namespace radbake::radiosity {
 
+/// Replicates of the chain from rows to texels, at most.
+inline constexpr int kMaxReplicates = 4;
+
+/// What the patches send, as one replicate of the chain has found it. Shapes: [patches], lx.
+struct SentLight {
+  std::span<const Vec3> radiosity;     ///< B'
+  std::span<const Vec3> glow = {};     ///< E_in, the part of B' that is not reflected; empty: nobody asks
+  std::span<const Vec3> coarser = {};  ///< B' of patches twice as large; empty: nobody asks
+};
+
 /// What a gather reads. All parts outlive it.
 struct GatherScene {
   const Surfaces& surfaces;
   const Visibility& visibility;
   const HemisphereEstimator& rows;
   const DirectLight& direct;
-  std::span<const Vec3> radiosity;  ///< [patches] B'
-  std::span<const Vec3> glow;       ///< [patches] E_in, the part of B' that is not reflected
+  std::span<const SentLight> sent;  ///< [rows.replicates()]
   Vec3 sky;                         ///< luminance, nit
   std::uint64_t seed = 0;
   /// Of channels 1 and 2, where they have rows of their own; `rows` is channel 0's then.
@@ -25,13 +35,25 @@ struct GatherScene {
   double dark = 0;  ///< radiosity up to this is none: what the solver cannot tell from 0, lx
 };
 
-/// Light that arrives at one receiver.
+/// Light that arrives at one receiver, mean over the part that counts, lx.
+struct ReceivedLight {
+  Vec3 gathered;   ///< along hemisphere rays: from patches, and from the sky where it is not sampled
+  Vec3 direct;     ///< straight from emitters, lamps and sampled skies
+  Vec3 reflected;  ///< of `gathered` what surfaces reflect
+  Vec3 coarser;    ///< what `gathered` would gain from patches twice as large
+
+  Vec3 irradiance() const { return gathered + direct; }
+};
+
 struct Reception {
-  Vec3 irradiance;        ///< mean over the part that counts, lx
-  Vec3 indirect;          ///< of it what surfaces reflect, lx
-  double openness = 0;    ///< cosine-weighted share of directions in which nothing is within the rows' near distance
-  bool is_buried = true;  ///< most of it lies inside other geometry: irradiance means nothing
+  std::array<ReceivedLight, kMaxReplicates> replicates;  ///< [rows.replicates()], independent of each other
+  double openness = 0;       ///< cosine-weighted share of directions in which nothing is within the rows' near distance
+  double visible_share = 0;  ///< of the sites: those that count
+  bool is_buried = true;     ///< most of it lies inside other geometry: there is no light to tell
   std::uint64_t rays = 0, light_rays = 0;
+
+  /// Mean of the replicates.
+  ReceivedLight mean(int num_replicates) const;
 };
 
 /// Buffers that one thread reuses from receiver to receiver.
@@ -47,7 +69,8 @@ struct ReceiveScratch {
   std::vector<std::uint32_t> part;
 };
 
-/// Gathers the light at scratch.sites, which are spread over one receiver.
+/// Gathers the light at scratch.sites, which are spread over one receiver; each replicate has its share of them, in
+/// order. What counts is decided for all replicates together.
 ///
 ///   H = sum_j F_j B'_j + F_sky pi L_sky + H^direct       over the visible part
 ///   H^indirect = sum_j F_j (B'_j - E_in_j)
@@ -57,6 +80,8 @@ struct ReceiveScratch {
 /// no light enters (the ground under a box that stands on it). Where something thin stands across the receiver, only
 /// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
 /// of a wall, or a mean of both, would be a leak. `rays_seed`, `light_seed`: what the receiver is.
-Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch);
+/// `light_samples`: shadow rays to emitters, of all replicates; 0: as many as scene.direct has.
+Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch,
+                  int light_samples = 0);
 
 }  // namespace radbake::radiosity

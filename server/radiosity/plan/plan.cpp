@@ -99,6 +99,11 @@ void give_reasons(const BakeOptions& options, std::uint64_t row_entries, BakePla
 
 }  // namespace
 
+int num_replicates_of(FormFactors method) {
+  constexpr int kReplicates = 4;  // no fewer tell their spread
+  return method == FormFactors::kHemisphere || method == FormFactors::kAdaptive ? kReplicates : 1;
+}
+
 void choose_methods(const BakeOptions& options, BakePlan& plan) {
   plan.form_factors = options.form_factors == FormFactors::kAuto ? FormFactors::kHemisphere : options.form_factors;
 

@@ -104,6 +104,9 @@ Result<void> check_options(const BakeOptions& options);
 /// The bound on patches that is asked for, or the default of the method.
 int max_patches_of(const BakeOptions& options);
 
+/// Independent replicates that a system is estimated in: one where rows are not sampled by rays.
+int num_replicates_of(FormFactors method);
+
 /// Chooses what options leave open: form factors, transport, solver. Needs the plan's survey, rays and patches.
 ///
 /// Form factors: hemisphere rays. Solver: Gauss-Seidel; Krylov above a reflectance of 0.95, where sweeps grow in number

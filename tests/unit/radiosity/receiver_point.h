@@ -60,12 +60,13 @@ class ReceiverPoint {
     const HemisphereEstimator rows(surfaces, patches_, *visibility_, rays);
     const DirectLight direct(surfaces, *visibility_, light_samples, Environment::Part::kBright);
     const std::vector<Vec3> radiosity(patches_.size());
-    const GatherScene scene{surfaces, *visibility_, rows, direct, radiosity, {}, surfaces.sky, seed};
+    const SentLight sent{radiosity};
+    const GatherScene scene{surfaces, *visibility_, rows, direct, std::span(&sent, 1), surfaces.sky, seed};
     ReceiveScratch scratch;
     scratch.sites.assign(static_cast<std::size_t>(rows.num_sites()), site);
     const Reception reception = receive(scene, mixed_bits(seed), mixed_bits(seed + 1000), scratch);
     EXPECT_FALSE(reception.is_buried);
-    return reception.irradiance;
+    return reception.replicates[0].irradiance();
   }
 
   Scene scene_;

@@ -14,6 +14,9 @@ struct JobProgress {
   std::uint64_t steps_total = 0;
   double seconds_left = -1;
   double residual = 0;
+  std::uint32_t pass = 0;
+  double relative_error = 0, relative_error_low = 0, relative_error_high = 0;
+  double asked_error = 0;
 };
 
 }  // namespace radbake::jobs

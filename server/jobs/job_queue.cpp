@@ -140,6 +140,18 @@ Result<void> JobQueue::cancel_live(const std::string& name) {
   return change(job, {JobState::kCancelled, record.attempt, record.lost_attempts, "cancelled before it ran", "", {}});
 }
 
+Result<std::shared_ptr<Job>> JobQueue::finish(const std::string& name) {
+  RADBAKE_ASSIGN_OR_RETURN(std::shared_ptr<Job> job, find(name));
+  thread_.run([&] { finish_live(name); });
+  return job;
+}
+
+void JobQueue::finish_live(const std::string& name) {
+  if (!find_live(name)) return;
+  to_finish_.insert(name);
+  if (const auto run = find_run(name)) run->request_finish();
+}
+
 void JobQueue::run_waiting_jobs() {
   while (!is_draining_ && !waiting_.empty() && num_running_ < options_.max_running) {
     const std::shared_ptr<Job> job = waiting_.front();
@@ -194,9 +206,10 @@ void JobQueue::start_job(const std::shared_ptr<Job>& job) {
     thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
   };
   events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
-  const auto run =
-      std::make_shared<WorkerRun>(WorkerRun::Assignment{name, record.attempt, false, record.work, std::nullopt},
-                                  options_.worker, content_, std::move(events));
+  const auto run = std::make_shared<WorkerRun>(
+      WorkerRun::Assignment{name, record.attempt, false, record.work, std::nullopt, record.created_unix_ms},
+      options_.worker, content_, std::move(events));
+  if (to_finish_.contains(name)) run->request_finish();
   add_run(run);
   ++num_running_;
   if (auto started = run->start(*gate_); !started.ok()) {
@@ -209,7 +222,8 @@ void JobQueue::advance(const std::string& name, JobState state) {
   const std::shared_ptr<Job> job = find_live(name);
   if (!job) return;
   const JobRecord record = job->record();
-  if (!is_running(record.state) || record.state == state) return;
+  // Passes go through the stages again; the record tells the furthest that was come to, and progress the present one.
+  if (!is_running(record.state) || record.state >= state) return;
   if (auto changed = change(job, {state, record.attempt, record.lost_attempts, "", "", {}}); !changed.ok()) {
     spdlog::error("{}: {}", name, changed.error().message);
   }
@@ -225,6 +239,7 @@ Result<void> JobQueue::change(const std::shared_ptr<Job>& job, StateChange chang
   const bool has_ended = is_terminal(record.state);
   job->set_record(std::move(recorded.record), std::move(recorded.event));
   if (has_ended) {
+    to_finish_.erase(name);
     const std::lock_guard lock(mutex_);
     live_.erase(name);
   }
@@ -329,7 +344,7 @@ Result<std::string> JobQueue::start_plan_run(const store::Work& work, PlanDone o
     thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
   };
   events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
-  const auto run = std::make_shared<WorkerRun>(WorkerRun::Assignment{name, 1, true, work, options_.plan_limit},
+  const auto run = std::make_shared<WorkerRun>(WorkerRun::Assignment{name, 1, true, work, options_.plan_limit, 0},
                                                options_.worker, content_, std::move(events));
   add_run(run);
   if (auto started = run->start(*gate_); !started.ok()) {

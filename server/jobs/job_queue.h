@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -63,6 +64,9 @@ class JobQueue {
   Result<std::vector<store::JobRecord>> list(std::uint32_t num_jobs, std::int64_t before_id);
   /// Asks a job to stop. No error if it has ended.
   Result<std::shared_ptr<Job>> cancel(const std::string& name);
+  /// Asks a job to end with the best result that it has; one that waits is asked as soon as it runs. No error if it has
+  /// ended. Errors: kNotFound.
+  Result<std::shared_ptr<Job>> finish(const std::string& name);
   Job::LatestProgress progress_of(const std::string& name) const;
 
   /// Runs a worker that only plans. `on_done` is called once, from any thread, with the bytes of the plan.
@@ -83,6 +87,7 @@ class JobQueue {
   Result<void> recover();
   Result<std::shared_ptr<Job>> accept_job(const store::NewJob& job);
   Result<void> cancel_live(const std::string& name);
+  void finish_live(const std::string& name);
   void request_cancel(WorkerRun& run);
   void run_waiting_jobs();
   void start_job(const std::shared_ptr<Job>& job);
@@ -113,6 +118,7 @@ class JobQueue {
 
   // Touched on thread_ alone.
   std::deque<std::shared_ptr<Job>> waiting_;
+  std::set<std::string> to_finish_;  // of the jobs that have not ended
   std::map<std::string, PlanDone> plans_;
   std::uint32_t num_running_ = 0;
   std::uint64_t next_plan_ = 1;

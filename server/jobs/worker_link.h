@@ -32,6 +32,7 @@ struct WorkOrder {
   bool is_plan = false;
   store::Work work;
   std::vector<InputFile> inputs;
+  double waited_seconds = 0;  ///< since the job was accepted
 };
 
 /// Part of a result blob. Parts follow each other without a gap.
@@ -56,6 +57,8 @@ class WorkerLink {
   virtual ~WorkerLink() = default;
   virtual void start(const WorkOrder& order) = 0;
   virtual void cancel() = 0;
+  /// The best result so far will do.
+  virtual void finish() = 0;
   /// Everything reported is stored: the worker may exit.
   virtual void accept() = 0;
 };

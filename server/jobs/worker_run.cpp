@@ -2,12 +2,20 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "common/base/version.h"
 
 namespace radbake::jobs {
 namespace {
+
+/// By the clock that was read when the job was accepted, maybe by an earlier server.
+double seconds_since(std::int64_t unix_ms) {
+  using std::chrono::milliseconds;
+  const std::chrono::system_clock::time_point then{milliseconds(unix_ms)};
+  return std::max(0.0, std::chrono::duration<double>(std::chrono::system_clock::now() - then).count());
+}
 
 std::string in_seconds(std::chrono::duration<double> duration) {
   std::string text = std::to_string(duration.count());
@@ -26,7 +34,7 @@ Result<void> WorkerRun::start(WorkerGate& gate) {
   // Open every input now: from here on the worker needs no file system.
   std::vector<store::FileDescriptor> files;
   std::vector<int> inherited;
-  WorkOrder order{assignment_.is_plan, assignment_.work, {}};
+  WorkOrder order{assignment_.is_plan, assignment_.work, {}, 0};
   for (const Digest& digest : assignment_.work.inputs) {
     RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(digest));
     order.inputs.push_back({digest, file.get()});
@@ -72,7 +80,9 @@ Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLi
   }
   last_heard_at_ = Clock::now();
   link_ = std::move(link);
+  if (assignment_.accepted_unix_ms > 0) order_.waited_seconds = seconds_since(assignment_.accepted_unix_ms);
   link_->start(order_);
+  if (is_finish_requested_) link_->finish();
   if (cancel_requested_at_) link_->cancel();
   return {};
 }
@@ -142,6 +152,12 @@ void WorkerRun::request_cancel() {
   if (cancel_requested_at_) return;
   cancel_requested_at_ = Clock::now();
   if (link_) link_->cancel();
+}
+
+void WorkerRun::request_finish() {
+  const std::lock_guard lock(mutex_);
+  if (cancel_requested_at_ || std::exchange(is_finish_requested_, true)) return;
+  if (link_) link_->finish();
 }
 
 bool WorkerRun::is_cancel_requested() const {

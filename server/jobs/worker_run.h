@@ -46,6 +46,7 @@ class WorkerRun {
     bool is_plan = false;
     store::Work work;
     std::optional<Clock::duration> time_limit;
+    std::int64_t accepted_unix_ms = 0;  ///< when the job was accepted; 0: it does not matter
   };
 
   WorkerRun(Assignment assignment, const WorkerOptions& options, store::ContentStore& content, RunEvents events);
@@ -65,6 +66,8 @@ class WorkerRun {
 
   // What the queue decides.
   void request_cancel();
+  /// Asks for the best result so far. Nothing happens after a cancel.
+  void request_finish();
   bool is_cancel_requested() const;
   void accept();
   void kill(const std::string& reason);
@@ -94,6 +97,7 @@ class WorkerRun {
   Clock::time_point started_at_;
   Clock::time_point last_heard_at_;
   std::optional<Clock::time_point> cancel_requested_at_;
+  bool is_finish_requested_ = false;
   std::optional<Clock::time_point> accepted_at_;
   std::optional<Clock::time_point> disconnected_at_;
   bool has_outcome_ = false;

@@ -120,6 +120,11 @@ grpc::ServerUnaryReactor* BakesService::CancelBake(grpc::CallbackServerContext* 
   return run_on_pool(context, [this, request, bake] { return reply(queue_.cancel(request->name()), *bake); });
 }
 
+grpc::ServerUnaryReactor* BakesService::FinishBake(grpc::CallbackServerContext* context,
+                                                   const v1::FinishBakeRequest* request, v1::Bake* bake) {
+  return run_on_pool(context, [this, request, bake] { return reply(queue_.finish(request->name()), *bake); });
+}
+
 grpc::ServerUnaryReactor* BakesService::ListBakes(grpc::CallbackServerContext* context,
                                                   const v1::ListBakesRequest* request,
                                                   v1::ListBakesResponse* response) {

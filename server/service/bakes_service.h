@@ -26,6 +26,8 @@ class BakesService : public v1::Bakes::CallbackService {
                                       v1::ListBakesResponse* response) override;
   grpc::ServerUnaryReactor* CancelBake(grpc::CallbackServerContext* context, const v1::CancelBakeRequest* request,
                                        v1::Bake* bake) override;
+  grpc::ServerUnaryReactor* FinishBake(grpc::CallbackServerContext* context, const v1::FinishBakeRequest* request,
+                                       v1::Bake* bake) override;
   grpc::ServerWriteReactor<v1::WatchBakeResponse>* WatchBake(grpc::CallbackServerContext* context,
                                                              const v1::WatchBakeRequest* request) override;
 

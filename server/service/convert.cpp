@@ -32,6 +32,11 @@ jobs::JobProgress from_message(const v1::Progress& progress) {
   own.steps_total = progress.steps_total();
   own.seconds_left = progress.seconds_left();
   own.residual = progress.residual();
+  own.pass = progress.pass();
+  own.relative_error = progress.relative_error();
+  own.relative_error_low = progress.relative_error_low();
+  own.relative_error_high = progress.relative_error_high();
+  own.asked_error = progress.asked_error();
   return own;
 }
 
@@ -43,6 +48,11 @@ v1::Progress to_message(const jobs::JobProgress& progress) {
   message.set_steps_total(progress.steps_total);
   message.set_seconds_left(progress.seconds_left);
   message.set_residual(progress.residual);
+  message.set_pass(progress.pass);
+  message.set_relative_error(progress.relative_error);
+  message.set_relative_error_low(progress.relative_error_low);
+  message.set_relative_error_high(progress.relative_error_high);
+  message.set_asked_error(progress.asked_error);
   return message;
 }
 

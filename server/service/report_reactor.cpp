@@ -22,6 +22,11 @@ class Link : public jobs::WorkerLink {
     command.mutable_cancel();
     if (const auto reactor = reactor_.lock()) reactor->send(std::move(command));
   }
+  void finish() override {
+    v1::WorkerCommand command;
+    command.mutable_finish();
+    if (const auto reactor = reactor_.lock()) reactor->send(std::move(command));
+  }
   void accept() override {
     v1::WorkerCommand command;
     command.mutable_accepted();
@@ -102,6 +107,7 @@ v1::WorkerCommand ReportReactor::start_command(const jobs::WorkOrder& order) con
   v1::WorkerCommand command;
   v1::StartWork& start = *command.mutable_start();
   start.set_plan_only(order.is_plan);
+  start.set_waited_seconds(order.waited_seconds);
   *start.mutable_manifest() = to_message(order.work.manifest);
   start.mutable_settings()->ParseFromString(order.work.settings);
   start.mutable_run()->ParseFromString(order.work.run);

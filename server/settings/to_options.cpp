@@ -75,6 +75,8 @@ radiosity::BakeOptions to_options(const v1::BakeSettings& settings, const v1::Ru
     options.wants_ao |= layer == v1::EXTRA_LAYER_AO;
   }
   options.ao_distance = settings.ao_distance();
+  options.max_error = settings.max_error();
+  options.time_budget_seconds = 1e-3 * static_cast<double>(settings.time_budget_ms());
   options.threads = static_cast<int>(run.threads());
   return options;
 }
@@ -110,6 +112,29 @@ std::optional<FieldProblem> find_effect_problem(const v1::BakeSettings& settings
   if (!(settings.ao_distance() >= 0 && settings.ao_distance() <= kMaxDistance)) {
     return FieldProblem{"settings.ao_distance",
                         std::to_string(settings.ao_distance()) + " is not between 0 and 1000000"};
+  }
+  return std::nullopt;
+}
+
+std::optional<FieldProblem> find_target_problem(const v1::BakeSettings& settings) {
+  const double error = settings.max_error();
+  const std::uint64_t budget = settings.time_budget_ms();
+  if (!(error >= 0 && error < 1)) {
+    return FieldProblem{"settings.max_error", std::to_string(error) + " is not at least 0 and below 1"};
+  }
+  if (budget > kMaxTimeBudgetMs) {
+    return FieldProblem{"settings.time_budget_ms",
+                        std::to_string(budget) + " is above " + std::to_string(kMaxTimeBudgetMs) + ", 30 days"};
+  }
+  if (settings.rays() > 0 && (error > 0 || budget > 0)) {
+    const std::string asked =
+        error > 0 ? "max_error " + std::to_string(error) : "time_budget_ms " + std::to_string(budget);
+    return FieldProblem{error > 0 ? "settings.max_error" : "settings.time_budget_ms",
+                        asked + " chooses the rays by itself: not with rays " + std::to_string(settings.rays())};
+  }
+  if (error > 0 && settings.output() == v1::OUTPUT_VERTICES) {
+    return FieldProblem{"settings.max_error",
+                        std::to_string(error) + " is the error of a lightmap: not with OUTPUT_VERTICES"};
   }
   return std::nullopt;
 }

@@ -83,6 +83,7 @@ void ReportStream::read_commands() {
   v1::WorkerCommand command;
   while (stream_->Read(&command)) {
     if (command.has_cancel()) stop_.request_stop();
+    if (command.has_finish()) finish_.request_stop();
     const std::lock_guard lock(mutex_);
     if (command.has_start()) start_ = std::move(*command.mutable_start());
     if (command.has_accepted()) is_accepted_ = true;

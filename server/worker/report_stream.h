@@ -43,6 +43,8 @@ class ReportStream {
 
   /// Requested when the server asks to cancel, and when it is gone.
   std::stop_token stop_token() const { return stop_.get_token(); }
+  /// Requested when the server asks to end with the best result so far.
+  std::stop_token finish_token() const { return finish_.get_token(); }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -55,7 +57,7 @@ class ReportStream {
   grpc::ClientContext context_;
   std::unique_ptr<v1::Workers::Stub> stub_;
   std::unique_ptr<grpc::ClientReaderWriter<v1::WorkerReport, v1::WorkerCommand>> stream_;
-  std::stop_source stop_;
+  std::stop_source stop_, finish_;
 
   std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;

@@ -148,6 +148,44 @@ v1::VertexReport to_message(const radiosity::VertexSummary& vertices) {
   return out;
 }
 
+v1::ErrorReport to_message(const radiosity::ErrorSummary& error) {
+  v1::ErrorReport out;
+  out.set_relative_rmse(error.relative_rmse);
+  out.set_interval_low(error.interval_low);
+  out.set_interval_high(error.interval_high);
+  out.set_algebraic(error.algebraic);
+  out.set_sampling(error.sampling);
+  out.set_discretisation(error.discretisation);
+  v1::WorstTexels& worst = *out.mutable_worst_1_percent();
+  worst.set_error(error.worst.error);
+  worst.set_lightmap(static_cast<std::uint32_t>(error.worst.lightmap));
+  worst.set_x(static_cast<std::uint32_t>(error.worst.x));
+  worst.set_y(static_cast<std::uint32_t>(error.worst.y));
+  worst.set_mesh(error.worst.mesh);
+  out.set_asked(error.asked);
+  out.set_predicted(error.predicted);
+  out.set_reached(error.is_reached);
+  out.set_limited_by(error.limited_by);
+  out.set_num_texels(error.num_texels);
+  return out;
+}
+
+v1::PassReport to_message(const radiosity::PassSummary& pass) {
+  v1::PassReport out;
+  out.set_num_patches(pass.num_patches);
+  out.set_rays_per_row(static_cast<std::uint32_t>(pass.rays_per_row));
+  out.set_rays_per_texel(static_cast<std::uint32_t>(pass.rays_per_texel));
+  out.set_light_samples_per_texel(static_cast<std::uint32_t>(pass.light_samples_per_texel));
+  out.set_num_gathered(pass.num_gathered);
+  out.set_num_row_rays(pass.num_row_rays);
+  out.set_num_gather_rays(pass.num_gather_rays);
+  out.set_num_light_rays(pass.num_light_rays);
+  out.set_relative_rmse(pass.relative_rmse);
+  out.set_interval_low(pass.interval_low);
+  out.set_interval_high(pass.interval_high);
+  return out;
+}
+
 v1::UvSource to_source(radiosity::UvSource source) {
   switch (source) {
     case radiosity::UvSource::kNone: return v1::UV_NONE;
@@ -243,6 +281,11 @@ v1::Progress to_message(const radiosity::BakeProgress& progress) {
   out.set_steps_total(progress.steps_total);
   out.set_seconds_left(progress.seconds_left);
   out.set_residual(progress.residual);
+  out.set_pass(static_cast<std::uint32_t>(progress.pass));
+  out.set_relative_error(progress.relative_error);
+  out.set_relative_error_low(progress.relative_error_low);
+  out.set_relative_error_high(progress.relative_error_high);
+  out.set_asked_error(progress.asked_error);
   return out;
 }
 
@@ -306,6 +349,8 @@ v1::BakeReport to_message(const radiosity::BakeReport& report) {
   *out.mutable_transport() = to_message(report.transport);
   *out.mutable_lightmap() = to_message(report.lightmap);
   *out.mutable_vertices() = to_message(report.vertices);
+  if (report.error.num_texels > 0) *out.mutable_error() = to_message(report.error);
+  for (const radiosity::PassSummary& pass : report.passes) *out.add_passes() = to_message(pass);
   for (const Warning& warning : report.warnings) *out.add_warnings() = to_message(warning);
   return out;
 }

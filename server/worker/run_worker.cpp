@@ -27,6 +27,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// A budget that has gone by is still one: 0 would be none.
+constexpr double kLeastBudgetSeconds = 1e-3;
+
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Passes on what a bake tells.
@@ -150,11 +153,16 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
   before.end();
 
-  const radiosity::BakeOptions options = options_of(start);
+  radiosity::BakeOptions options = options_of(start);
+  if (options.time_budget_seconds > 0) {
+    // What has gone since the bake was accepted, this process's start and the decoding among it, is not there any more.
+    options.time_budget_seconds =
+        std::max(kLeastBudgetSeconds, options.time_budget_seconds - start.waited_seconds() - seconds_since(began_at));
+  }
   StreamObserver observer(stream);
   const auto bake_began_at = Clock::now();
   RADBAKE_ASSIGN_OR_RETURN(const radiosity::BakeOutcome outcome,
-                           radiosity::bake_scene(scene, options, observer, stream.stop_token()));
+                           radiosity::bake_scene(scene, options, observer, stream.stop_token(), stream.finish_token()));
   const double bake_seconds = seconds_since(bake_began_at);
 
   after.begin("writing");
@@ -174,6 +182,11 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   *report.mutable_run()->mutable_prediction() = to_message(outcome.report.prediction);
   *report.mutable_run()->mutable_costs() = to_message(outcome.report.costs);
   const std::uint64_t num_rays = report.num_row_rays() + report.num_gather_rays() + report.num_light_rays();
+  for (const radiosity::PassSummary& pass : outcome.report.passes) {
+    v1::PassSeconds& seconds = *report.mutable_run()->add_passes();
+    seconds.set_seconds(pass.seconds);
+    seconds.set_cpu_seconds(pass.cpu_seconds);
+  }
   report.mutable_run()->set_rays_per_second(static_cast<double>(num_rays) / bake_seconds);
   v1::WorkerReport finished;
   *finished.mutable_bake_finished() = std::move(result);

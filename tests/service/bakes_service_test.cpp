@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 #include <thread>
 
 #include "common/base/version.h"
@@ -108,6 +109,33 @@ TEST_F(BakesServiceTest, GivesEqualWorkEqualBakeKeys) {
   EXPECT_NE(a.bake_key(), c.bake_key());
 }
 
+TEST_F(BakesServiceTest, GivesEachTargetAndEachBudgetABakeKeyOfItsOwn) {
+  const v1::Digest manifest = client_.upload_scene();
+  std::set<std::string> keys;
+  const auto add_key = [&](double max_error, std::uint64_t time_budget_ms) {
+    v1::SubmitBakeRequest request = client_.request_for(manifest, kSucceed);
+    request.set_validate_only(true);
+    request.mutable_settings()->set_max_error(max_error);
+    request.mutable_settings()->set_time_budget_ms(time_budget_ms);
+    v1::Bake bake;
+    EXPECT_TRUE(submit(request, &bake).ok());
+    keys.insert(bake.bake_key());
+  };
+  add_key(0, 0);
+  add_key(0, 0);
+  EXPECT_EQ(keys.size(), 1u);
+  add_key(0, 1000);
+  add_key(0, 2000);
+  add_key(0.02, 0);
+  add_key(0.02, 1000);
+  EXPECT_EQ(keys.size(), 5u);
+  // The key is the digest of the settings' bytes: those without the fields are as they were before there were any.
+  v1::BakeSettings old;
+  old.set_atlas_size(64);
+  old.set_rays(7);
+  EXPECT_EQ(old.SerializeAsString(), "\x08\x40\x18\x07");
+}
+
 TEST_F(BakesServiceTest, NamesEveryMissingBlob) {
   v1::SceneManifest manifest;
   for (const char* mesh : {"mesh one", "mesh two"}) *manifest.add_meshes()->mutable_blob() = digest_message(mesh);
@@ -171,6 +199,10 @@ TEST_F(BakesServiceTest, NamesTheFieldThatIsOutOfRange) {
   request.mutable_settings()->set_ao_distance(-1);
   EXPECT_EQ(refused_field(request), "settings.ao_distance");
   request = client_.request_for(manifest, kSucceed);
+  request.mutable_settings()->set_max_error(1.5);
+  EXPECT_EQ(refused_field(request), "settings.max_error");
+  EXPECT_THAT(submit(request).error_message(), HasSubstr("1.5"));
+  request = client_.request_for(manifest, kSucceed);
   request.clear_request_id();
   EXPECT_EQ(refused_field(request), "request_id");
   request = client_.request_for(manifest, kSucceed);
@@ -228,6 +260,60 @@ TEST_F(BakesServiceTest, CancelsARunningBakeAndAnEndedOneWithoutError) {
   EXPECT_EQ(client_.get(bake.name()).state(), v1::CANCELLED);
 }
 
+TEST_F(BakesServiceTest, FinishesARunningBakeAndAnEndedOneWithoutError) {
+  const v1::Bake bake = client_.submit(kRunUntilCancelled);
+  client_.wait_for(bake.name(), v1::FORM_FACTORS);
+  ASSERT_TRUE(client_.finish(bake.name()).ok());
+  EXPECT_TRUE(client_.finish(bake.name()).ok());
+  const v1::Bake finished = client_.watch(bake.name()).finished();
+  EXPECT_EQ(finished.state(), v1::SUCCEEDED) << finished.error().message();
+  EXPECT_EQ(finished.result().layers_size(), 1);
+  EXPECT_TRUE(client_.finish(bake.name()).ok());
+  EXPECT_EQ(client_.get(bake.name()).state(), v1::SUCCEEDED);
+}
+
+TEST_F(BakesServiceTest, FinishesAQueuedBakeAsSoonAsItRuns) {
+  const v1::Bake running = client_.submit(kRunUntilCancelled);
+  const v1::Bake queued = client_.submit(kRunUntilCancelled);
+  ASSERT_TRUE(client_.finish(queued.name()).ok());
+  EXPECT_EQ(client_.get(queued.name()).state(), v1::QUEUED);
+  ASSERT_TRUE(client_.cancel(running.name()).ok());
+  EXPECT_EQ(client_.watch(queued.name()).finished().state(), v1::SUCCEEDED);
+}
+
+TEST_F(BakesServiceTest, CancelsABakeThatWasToFinish) {
+  const v1::Bake bake = client_.submit(kIgnoreCancel);
+  client_.wait_for(bake.name(), v1::FORM_FACTORS);
+  ASSERT_TRUE(client_.finish(bake.name()).ok());
+  ASSERT_TRUE(client_.cancel(bake.name()).ok());
+  EXPECT_EQ(client_.watch(bake.name()).finished().state(), v1::CANCELLED);
+}
+
+TEST_F(BakesServiceTest, TellsPassErrorAndWhatWasAsked) {
+  v1::SubmitBakeRequest request = client_.request_for(client_.upload_scene(), kRunUntilCancelled);
+  request.mutable_settings()->set_max_error(0.02);
+  v1::Bake bake;
+  ASSERT_TRUE(submit(request, &bake).ok());
+  client_.wait_for(bake.name(), v1::FORM_FACTORS);
+  const v1::Progress progress = client_.get(bake.name()).progress();
+  EXPECT_EQ(progress.pass(), kFakePass);
+  EXPECT_EQ(progress.relative_error(), kFakeError);
+  EXPECT_EQ(progress.relative_error_low(), kFakeErrorLow);
+  EXPECT_EQ(progress.relative_error_high(), kFakeErrorHigh);
+  EXPECT_EQ(progress.asked_error(), 0.02);
+  ASSERT_TRUE(client_.finish(bake.name()).ok());
+  client_.watch(bake.name());
+}
+
+TEST_F(BakesServiceTest, TellsWorkersHowLongABakeHasWaited) {
+  const v1::Bake running = client_.submit(kRunUntilCancelled);
+  const v1::Bake queued = client_.submit(kSucceed);
+  const std::chrono::duration<double> wait = std::chrono::milliseconds(50);
+  std::this_thread::sleep_for(wait);
+  ASSERT_TRUE(client_.finish(running.name()).ok());
+  EXPECT_GE(client_.watch(queued.name()).finished().result().report().run().wall_seconds(), wait.count());
+}
+
 TEST_F(BakesServiceTest, SaysThatABakeDoesNotExist) {
   v1::GetBakeRequest request;
   request.set_name("bakes/none");
@@ -236,6 +322,7 @@ TEST_F(BakesServiceTest, SaysThatABakeDoesNotExist) {
   EXPECT_EQ(status.error_code(), grpc::NOT_FOUND);
   EXPECT_THAT(status.error_message(), HasSubstr("bakes/none"));
   EXPECT_EQ(client_.cancel("bakes/none").error_code(), grpc::NOT_FOUND);
+  EXPECT_EQ(client_.finish("bakes/none").error_code(), grpc::NOT_FOUND);
   EXPECT_EQ(client_.watch("bakes/none").status.error_code(), grpc::NOT_FOUND);
 }
 

@@ -58,6 +58,7 @@ class FakeWorker {
     v1::WorkerCommand command;
     while (stream_.Read(&command)) {
       if (command.has_cancel()) is_cancelled_ = true;
+      if (command.has_finish()) is_finishing_ = true;
       if (command.has_accepted()) return;
     }
     _exit(9);
@@ -106,10 +107,11 @@ class FakeWorker {
   }
 
   void run(bool obeys) {
-    while (!(obeys && is_cancelled_)) {
+    while (!(obeys && (is_cancelled_ || is_finishing_))) {
       report_progress(v1::FORM_FACTORS, 0.3);
       std::this_thread::sleep_for(10ms);
     }
+    if (!is_cancelled_) return succeed();
     v1::WorkerReport report;
     report.mutable_cancelled()->set_code(grpc::CANCELLED);
     stream_.Write(report);
@@ -119,6 +121,11 @@ class FakeWorker {
     v1::WorkerReport report;
     report.mutable_progress()->set_state(state);
     report.mutable_progress()->set_fraction(fraction);
+    report.mutable_progress()->set_pass(kFakePass);
+    report.mutable_progress()->set_relative_error(kFakeError);
+    report.mutable_progress()->set_relative_error_low(kFakeErrorLow);
+    report.mutable_progress()->set_relative_error_high(kFakeErrorHigh);
+    report.mutable_progress()->set_asked_error(start_.settings().max_error());
     stream_.Write(report);
   }
 
@@ -161,7 +168,10 @@ class FakeWorker {
     layer.set_height(layer_.height);
     layer.set_channels(kFakeChannels);
     set_digest(*layer.mutable_blob());
-    report.mutable_bake_finished()->mutable_report()->mutable_run()->mutable_costs()->set_row_ray(kFakeRayCost);
+    v1::RunReport& run = *report.mutable_bake_finished()->mutable_report()->mutable_run();
+    run.mutable_costs()->set_row_ray(kFakeRayCost);
+    // Says how long it was told that the bake had waited.
+    run.set_wall_seconds(start_.waited_seconds());
     stream_.Write(report);
   }
 
@@ -210,7 +220,7 @@ class FakeWorker {
   const std::string job_;
   const unsigned attempt_;
   v1::StartWork start_;
-  std::atomic<bool> is_cancelled_ = false;
+  std::atomic<bool> is_cancelled_ = false, is_finishing_ = false;
   std::thread reader_;
 };
 

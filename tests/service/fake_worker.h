@@ -9,7 +9,7 @@ enum FakeWork {
   kCrash = 3,               ///< ends by SIGSEGV in the middle
   kExitWithMessage = 4,     ///< writes a line to stderr and exits with code 7
   kHang = 5,                ///< says nothing any more
-  kRunUntilCancelled = 6,   ///< reports progress until it is told to stop
+  kRunUntilCancelled = 6,   ///< reports progress until it is told to stop, or to finish: then as kSucceed
   kIgnoreCancel = 7,        ///< reports progress for ever
   kSendWrongDigest = 8,     ///< its layer does not have the digest that it claims
   kNameUnsentBlob = 9,      ///< its result names a blob that it never sent
@@ -30,6 +30,9 @@ inline constexpr int kFakeChannels = 4;
 inline constexpr int kFakePatches = 42;
 /// What every fake bake says that a ray of a row costs, seconds.
 inline constexpr double kFakeRayCost = 0.0625;
+/// What every fake bake says of its error when it tells its progress.
+inline constexpr unsigned kFakePass = 2;
+inline constexpr double kFakeError = 0.25, kFakeErrorLow = 0.125, kFakeErrorHigh = 0.5;
 inline constexpr char kLastWords[] = "the fake worker says good-bye";
 
 }  // namespace radbake::testing

@@ -113,6 +113,13 @@ grpc::Status TestClient::cancel(const std::string& name) {
   return bakes->CancelBake(new_context().get(), request, &bake);
 }
 
+grpc::Status TestClient::finish(const std::string& name) {
+  v1::FinishBakeRequest request;
+  request.set_name(name);
+  v1::Bake bake;
+  return bakes->FinishBake(new_context().get(), request, &bake);
+}
+
 TestClient::Watched TestClient::watch(const std::string& name, std::uint64_t after_sequence, bool include_tiles,
                                       std::chrono::milliseconds pause) {
   v1::WatchBakeRequest request;

@@ -52,6 +52,7 @@ struct TestClient {
   v1::Bake submit(FakeWork work, unsigned num_tiles = 4);
   v1::Bake get(const std::string& name);
   grpc::Status cancel(const std::string& name);
+  grpc::Status finish(const std::string& name);
 
   struct Watched {
     grpc::Status status;

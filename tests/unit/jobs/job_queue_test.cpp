@@ -31,11 +31,24 @@ class FakeGate : public WorkerGate {
 };
 
 struct FakeLink : WorkerLink {
-  void start(const WorkOrder& order) override { num_inputs = order.inputs.size(); }
-  void cancel() override { is_cancelled = true; }
+  void start(const WorkOrder& order) override {
+    num_inputs = order.inputs.size();
+    waited_seconds = order.waited_seconds;
+    calls += "start ";
+  }
+  void cancel() override {
+    is_cancelled = true;
+    calls += "cancel ";
+  }
+  void finish() override {
+    is_finishing = true;
+    calls += "finish ";
+  }
   void accept() override { is_accepted = true; }
   std::atomic<std::size_t> num_inputs = 0;
-  std::atomic<bool> is_cancelled = false, is_accepted = false;
+  std::atomic<bool> is_cancelled = false, is_finishing = false, is_accepted = false;
+  std::atomic<double> waited_seconds = -1;
+  std::string calls;  // one at a time: the run calls under its lock
 };
 
 class JobQueueTest : public ::testing::Test {
@@ -136,6 +149,68 @@ TEST_F(JobQueueTest, PublishesAResultOnceAndFreesThePlaceOfAWorkerThatDoesNotExi
   ASSERT_EQ(events.size(), 4u);
   EXPECT_EQ(events[2].state, JobState::kSolving);
   EXPECT_TRUE(wait_for(second, JobState::kPreparing));
+}
+
+TEST_F(JobQueueTest, TellsAWorkerToFinishOnceAndThatACancelWins) {
+  const auto job = submit("a");
+  ASSERT_NE(greet(job), nullptr);
+  const std::string name = job->record().name;
+  ASSERT_TRUE(queue_->finish(name).ok());
+  ASSERT_TRUE(queue_->finish(name).ok());
+  EXPECT_EQ(link_->calls, "start finish ");
+  EXPECT_TRUE(store::is_running(job->record().state));
+  ASSERT_TRUE(queue_->cancel(name).ok());
+  ASSERT_TRUE(queue_->finish(name).ok());
+  EXPECT_EQ(link_->calls, "start finish cancel ");
+  EXPECT_TRUE(wait_for(job, JobState::kCancelled));  // the script does not obey: it is killed
+  EXPECT_TRUE(queue_->finish(name).ok());
+  EXPECT_EQ(job->record().state, JobState::kCancelled);
+  EXPECT_EQ(queue_->finish("bakes/none").error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(JobQueueTest, RemembersThatAWaitingJobIsToFinishUntilItRuns) {
+  const auto first = submit("a"), second = submit("b");
+  const auto run = greet(first);
+  ASSERT_NE(run, nullptr);
+  ASSERT_TRUE(queue_->finish(second->record().name).ok());
+  EXPECT_EQ(second->record().state, JobState::kQueued);
+  link_ = std::make_shared<FakeLink>();
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  ASSERT_NE(greet(second), nullptr);
+  EXPECT_EQ(link_->calls, "start finish ");
+}
+
+TEST_F(JobQueueTest, TellsAWorkerHowLongItsJobHasWaited) {
+  const auto first = submit("a"), second = submit("b");
+  const auto run = greet(first);
+  ASSERT_NE(run, nullptr);
+  EXPECT_GE(link_->waited_seconds, 0);
+  const std::chrono::duration<double> wait = 30ms;
+  std::this_thread::sleep_for(wait);
+  link_ = std::make_shared<FakeLink>();
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  ASSERT_NE(greet(second), nullptr);
+  EXPECT_GE(link_->waited_seconds, wait.count());
+}
+
+TEST_F(JobQueueTest, RecordsTheFurthestStateOfABakeWhosePassesGoThroughAllAgain) {
+  const auto job = submit("a");
+  const auto run = greet(job);
+  ASSERT_NE(run, nullptr);
+  JobProgress progress;
+  for (const JobState state :
+       {JobState::kGathering, JobState::kFormFactors, JobState::kSolving, JobState::kGathering}) {
+    progress.state = state;
+    progress.pass = 1;
+    run->report_progress(progress);
+  }
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
+  std::vector<JobState> states;
+  for (const store::JobEvent& event : job->events_after(0)) states.push_back(event.state);
+  EXPECT_THAT(states, ::testing::ElementsAre(JobState::kQueued, JobState::kPreparing, JobState::kGathering,
+                                             JobState::kSucceeded));
+  EXPECT_EQ(job->progress().progress.pass, 1u);
 }
 
 TEST_F(JobQueueTest, RefusesASecondWorkerAndAnotherAttempt) {

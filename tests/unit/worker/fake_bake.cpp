@@ -10,6 +10,7 @@ namespace radbake {
 
 std::atomic<int> num_fake_tiles;
 std::atomic<bool> fake_saw_stop;
+std::atomic<double> fake_time_budget_seconds;
 
 namespace radiosity {
 namespace {
@@ -45,11 +46,16 @@ Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, s
 }
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
-                               std::stop_token stop) {
+                               std::stop_token stop, std::stop_token finish) {
   num_fake_tiles = 0;
   fake_saw_stop = false;
+  fake_time_budget_seconds = options.time_budget_seconds;
   int num_tiles = 2;
   switch (options.seed) {
+    case kWaitsForFinish:
+      while (!finish.stop_requested() && !stop.stop_requested()) std::this_thread::sleep_for(1ms);
+      if (!stop.stop_requested()) break;
+      [[fallthrough]];
     case kWaitsForStop:
       while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
       fake_saw_stop = true;
@@ -79,6 +85,9 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
   outcome.report.plan = fake_plan(scene);
   outcome.report.num_gather_rays = 1000;
   outcome.report.stages = {{"preparing", 0.25, 0.375}, {"gathering", 0.5, 0.75}};
+  outcome.report.passes.resize(2);
+  outcome.report.passes[1].seconds = 1.5;
+  outcome.report.passes[1].cpu_seconds = 2.5;
   outcome.report.prediction = fake_prediction(options);
   outcome.report.costs = options.costs;
   outcome.report.costs.texel_ray = 0.125;

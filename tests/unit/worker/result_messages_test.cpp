@@ -133,6 +133,9 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   report.transport = {37, 38.5, 39.5, 40.5, 41.5, 42, 43.5, 44.5, 45.5, 46};
   report.lightmap = {45, 46, 47, 48, 49.5, 50, 51, 52.5, 53, 54, 55, 56, 57.5, 58, 59.5, 60.5};
   report.vertices = {61, 62, 63};
+  report.error = {64.5, 65.5, 66.5, 67.5, 68.5, 69.5, {}, 74.5, 75.5, true, "time", 76};
+  report.error.worst = {70.5, 71, 72, 73, "wall"};
+  report.passes = {{77, 78, 79, 80, 81, 82, 83, 84, 85.5, 86.5, 87.5, 88.5, 89.5}};
   report.warnings = {{"bake_warning", "of the bake"}};
   const v1::BakeReport message = to_message(report);
   EXPECT_THAT(unset_fields(message), ::testing::UnorderedElementsAre("plan.prediction", "engine_version", "run"));
@@ -149,14 +152,40 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   EXPECT_EQ(message.lightmap().num_meshes_unwrapped(), 55U);
   EXPECT_EQ(message.lightmap().seam_difference(), 60.5);
   EXPECT_EQ(message.vertices().num_copies(), 63U);
+  EXPECT_EQ(message.error().relative_rmse(), 64.5);
+  EXPECT_EQ(message.error().interval_low(), 65.5);
+  EXPECT_EQ(message.error().interval_high(), 66.5);
+  EXPECT_EQ(message.error().algebraic(), 67.5);
+  EXPECT_EQ(message.error().sampling(), 68.5);
+  EXPECT_EQ(message.error().discretisation(), 69.5);
+  EXPECT_EQ(message.error().worst_1_percent().error(), 70.5);
+  EXPECT_EQ(message.error().worst_1_percent().lightmap(), 71U);
+  EXPECT_EQ(message.error().worst_1_percent().y(), 73U);
+  EXPECT_EQ(message.error().worst_1_percent().mesh(), "wall");
+  EXPECT_EQ(message.error().asked(), 74.5);
+  EXPECT_EQ(message.error().predicted(), 75.5);
+  EXPECT_EQ(message.error().limited_by(), "time");
+  EXPECT_EQ(message.error().num_texels(), 76U);
+  EXPECT_EQ(message.passes(0).num_patches(), 77U);
+  EXPECT_EQ(message.passes(0).rays_per_texel(), 79U);
+  EXPECT_EQ(message.passes(0).num_gather_rays(), 83U);
+  EXPECT_EQ(message.passes(0).interval_high(), 87.5);
   EXPECT_EQ(message.warnings(0).text(), "of the bake");
+  // Without a lightmap there are no texels to be wrong.
+  report.error = {};
+  EXPECT_FALSE(to_message(report).has_error());
 }
 
 TEST(ResultMessages, SetEveryFieldOfProgressTileAndLayer) {
-  radiosity::BakeProgress progress{radiosity::BakeStage::kSolving, 0.5, 3, 4, 5.5, 6.5};
+  radiosity::BakeProgress progress{radiosity::BakeStage::kSolving, 0.5, 3, 4, 5.5, 6.5, 7, 8.5, 9.5, 10.5, 11.5};
   EXPECT_THAT(unset_fields(to_message(progress)), ::testing::IsEmpty());
   EXPECT_EQ(to_message(progress).state(), v1::SOLVING);
   EXPECT_EQ(to_message(progress).seconds_left(), 5.5);
+  EXPECT_EQ(to_message(progress).pass(), 7U);
+  EXPECT_EQ(to_message(progress).relative_error(), 8.5);
+  EXPECT_EQ(to_message(progress).relative_error_low(), 9.5);
+  EXPECT_EQ(to_message(progress).relative_error_high(), 10.5);
+  EXPECT_EQ(to_message(progress).asked_error(), 11.5);
 
   radiosity::Tile tile{1, 2, 3, 4, 2, 1, 4, {0, 1, 2, 3, 4, 5, 6, 7}};
   tile.layer_name = "lightmap_1";
@@ -222,6 +251,9 @@ TEST(ResultMessages, ReadEverySetting) {
   settings.add_layers(v1::EXTRA_LAYER_INDIRECT);
   settings.add_layers(v1::EXTRA_LAYER_AO);
   settings.set_ao_distance(2.5);
+  settings.set_max_error(0.02);
+  settings.set_time_budget_ms(1500);
+  EXPECT_THAT(unset_fields(settings), ::testing::IsEmpty());
   v1::RunOptions run;
   run.set_threads(3);
   const radiosity::BakeOptions options = settings::to_options(settings, run);
@@ -243,6 +275,8 @@ TEST(ResultMessages, ReadEverySetting) {
   EXPECT_TRUE(options.wants_indirect);
   EXPECT_TRUE(options.wants_ao);
   EXPECT_EQ(options.ao_distance, 2.5);
+  EXPECT_EQ(options.max_error, 0.02);
+  EXPECT_EQ(options.time_budget_seconds, 1.5);
   EXPECT_FALSE(settings::find_effect_problem(settings).has_value());
 }
 
@@ -269,6 +303,36 @@ TEST(Settings, NameTheEffectOrLayerThatIsWrong) {
   EXPECT_EQ(problem([](auto& s) { s.set_ao_distance(-1); }),
             "settings.ao_distance: -1.000000 is not between 0 and 1000000");
   EXPECT_THAT(problem([](auto& s) { s.set_ao_distance(NAN); }), StartsWith("settings.ao_distance: "));
+}
+
+TEST(Settings, NameTheTargetOrBudgetThatIsWrong) {
+  const auto problem = [](double max_error, std::uint64_t budget_ms, unsigned rays = 0,
+                          v1::Output output = v1::OUTPUT_LIGHTMAP) {
+    v1::BakeSettings settings;
+    settings.set_max_error(max_error);
+    settings.set_time_budget_ms(budget_ms);
+    settings.set_rays(rays);
+    settings.set_output(output);
+    const auto found = settings::find_target_problem(settings);
+    return found ? found->field + ": " + found->description : std::string();
+  };
+  using ::testing::StartsWith;
+  EXPECT_EQ(problem(0, 0), "");
+  EXPECT_EQ(problem(0.02, 1000), "");
+  EXPECT_EQ(problem(0.02, 0, 0, v1::OUTPUT_BOTH), "");
+  EXPECT_EQ(problem(0, settings::kMaxTimeBudgetMs, 0, v1::OUTPUT_VERTICES), "");
+  EXPECT_EQ(problem(0, 0, 64), "");
+  EXPECT_EQ(problem(-0.5, 0), "settings.max_error: -0.500000 is not at least 0 and below 1");
+  EXPECT_EQ(problem(1, 0), "settings.max_error: 1.000000 is not at least 0 and below 1");
+  EXPECT_THAT(problem(NAN, 0), StartsWith("settings.max_error: "));
+  EXPECT_THAT(problem(INFINITY, 0), StartsWith("settings.max_error: inf "));
+  EXPECT_EQ(problem(0, settings::kMaxTimeBudgetMs + 1),
+            "settings.time_budget_ms: 2592000001 is above 2592000000, 30 days");
+  EXPECT_EQ(problem(0.02, 1000, 64),
+            "settings.max_error: max_error 0.020000 chooses the rays by itself: not with rays 64");
+  EXPECT_EQ(problem(0, 1000, 64),
+            "settings.time_budget_ms: time_budget_ms 1000 chooses the rays by itself: not with rays 64");
+  EXPECT_THAT(problem(0.02, 0, 0, v1::OUTPUT_VERTICES), StartsWith("settings.max_error: 0.020000 is the error of a"));
 }
 
 /// The words of the wire are those of the library: what is chosen by name on one side has that name on the other.

@@ -140,6 +140,9 @@ TEST(RunWorker, FillsInTheReportOfTheRun) {
   EXPECT_EQ(run.attempt(), 3U);
   EXPECT_EQ(run.worker_start_seconds(), 0.5);
   EXPECT_GT(run.rays_per_second(), 0);
+  ASSERT_EQ(run.passes_size(), 2);
+  EXPECT_EQ(run.passes(1).seconds(), 1.5);
+  EXPECT_EQ(run.passes(1).cpu_seconds(), 2.5);
 }
 
 TEST(RunWorker, PlansWithoutBaking) {
@@ -214,6 +217,55 @@ TEST(RunWorker, StopsTheBakeWhenItIsCancelled) {
   EXPECT_EQ(exit_code, worker::kExitDone);
   ASSERT_TRUE(reports.back().has_cancelled());
   EXPECT_EQ(reports.back().cancelled().code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST(RunWorker, EndsTheBakeWithWhatItHasWhenItIsAskedTo) {
+  const BlobFiles files(small_scene());
+  Reports reports;
+  const int exit_code = run_against([&](WorkerStream& stream) {
+    stream.Write(files.order(kWaitsForFinish));
+    v1::WorkerCommand finish;
+    finish.mutable_finish();
+    stream.Write(finish);
+    reports = read_to_outcome(stream);
+    accept(stream);
+  });
+  EXPECT_EQ(exit_code, worker::kExitDone);
+  ASSERT_TRUE(reports.back().has_bake_finished());
+  EXPECT_EQ(reports.back().bake_finished().layers_size(), 1);
+}
+
+TEST(RunWorker, StopsABakeThatWasToFinishWhenItIsCancelled) {
+  const BlobFiles files(small_scene());
+  Reports reports;
+  run_against([&](WorkerStream& stream) {
+    stream.Write(files.order(kWaitsForStop));
+    v1::WorkerCommand command;
+    command.mutable_finish();
+    stream.Write(command);
+    command.mutable_cancel();
+    stream.Write(command);
+    reports = read_to_outcome(stream);
+    accept(stream);
+  });
+  EXPECT_TRUE(reports.back().has_cancelled());
+}
+
+TEST(RunWorker, TakesWhatHasGoneByOffTheTimeBudget) {
+  const BlobFiles files(small_scene());
+  v1::WorkerCommand order = files.order(kBakes);
+  v1::StartWork& start = *order.mutable_start();
+  start.set_waited_seconds(4);
+  reports_of(order);
+  EXPECT_EQ(fake_time_budget_seconds, 0);  // none stays none
+  start.mutable_settings()->set_time_budget_ms(10'000);
+  reports_of(order);
+  EXPECT_GT(fake_time_budget_seconds, 0);
+  EXPECT_LT(fake_time_budget_seconds, 6);  // reading the scene takes time, too
+  start.set_waited_seconds(20);
+  reports_of(order);
+  EXPECT_GT(fake_time_budget_seconds, 0);
+  EXPECT_LT(fake_time_budget_seconds, 0.01);
 }
 
 TEST(RunWorker, StopsTheBakeWhenTheServerGoes) {

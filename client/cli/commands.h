@@ -27,6 +27,8 @@ ExitCode run_watch(const CommandContext& context);
 ExitCode run_cancel(const CommandContext& context);
 ExitCode run_download(const CommandContext& context);
 ExitCode run_capabilities(const CommandContext& context);
+/// Of two files; needs no server.
+ExitCode run_compare(const CommandContext& context);
 
 /// The server of a command: the one that the command line names, or a private one that ends with this object.
 struct Session {

@@ -96,4 +96,16 @@ inline constexpr char kCapabilitiesFooter[] =
     "  radbake capabilities                              of a private server\n"
     "  radbake capabilities --server bakery:7419 --json | jq .limits.max_triangles\n\n";
 
+inline constexpr char kCompareFooter[] =
+    "\nPrints, over texels inside charts that are no emitters:\n"
+    "  rrmse      root mean square difference over texels and channels / mean of the reference\n"
+    "  per_texel  root mean square of each texel's relative difference of luminance; p95: its 95th percentile\n"
+    "  bias       mean difference / mean of the reference\n"
+    "and percentiles of that relative difference with the place of the largest. With --error: the share of values\n"
+    "within 1.96 standard errors (95 % where they hold) and the standardised error (1 where they hold).\n"
+    "\nExamples:\n"
+    "  radbake compare reference/lightmap_0.exr baked/lightmap_0.exr -o difference.png\n"
+    "  radbake compare reference/lightmap_0.exr baked/lightmap_0.exr --error baked/error_0.exr\n"
+    "  radbake compare tests/golden/cornell_ref.exr baked/lightmap_0.exr --scale 0.31830988618 --json | jq .rrmse\n\n";
+
 }  // namespace radbake::cli

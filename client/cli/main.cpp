@@ -18,6 +18,7 @@ ExitCode run(const CommandContext& context) {
     case Command::kCancel: return run_cancel(context);
     case Command::kDownload: return run_download(context);
     case Command::kCapabilities: return run_capabilities(context);
+    case Command::kCompare: return run_compare(context);
   }
   return kUsage;
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <sstream>
 
@@ -40,6 +41,7 @@ class Parser {
         ->type_name("SCENE");
     add_command(Command::kCapabilities, "capabilities", "Say what a server can do, and its limits",
                 kCapabilitiesFooter);
+    add_compare();
   }
 
   std::variant<CommandLine, EarlyExit> parse(const std::vector<std::string>& arguments) {
@@ -55,7 +57,7 @@ class Parser {
     const char* server = std::getenv("RADBAKE_SERVER");
     if (line_.server.empty() && server != nullptr) line_.server = server;
     if (line_.server.empty() && line_.command != Command::kSubmit && line_.command != Command::kPlan &&
-        line_.command != Command::kCapabilities) {
+        line_.command != Command::kCapabilities && line_.command != Command::kCompare) {
       return EarlyExit{kUsage, "",
                        "radbake " + app_.get_subcommands().front()->get_name() +
                            " needs a server: --server HOST:PORT or unix:PATH, or RADBAKE_SERVER\n"};
@@ -140,6 +142,41 @@ class Parser {
         ->check(CLI::Range(1.0, 86400.0))
         ->capture_default_str()
         ->type_name("S");
+  }
+
+  // The one command without a server.
+  void add_compare() {
+    CLI::App* sub = app_.add_subcommand("compare", "Say how far a lightmap is from a reference, and draw where");
+    sub->footer(kCompareFooter + std::string(kExitCodes));
+    sub->callback([this] { line_.command = Command::kCompare; });
+    CompareChoices& choices = line_.compare;
+    sub->add_option("REFERENCE", choices.reference, "EXR that is taken for the truth")->required()->type_name("");
+    sub->add_option("MAP", choices.map, "EXR of the same size that is compared with it")->required()->type_name("");
+    sub->add_option("--scale", choices.scale, "Factor on MAP: 0.31830988618 where REFERENCE is irradiance / pi")
+        ->check(check_scale, "")
+        ->capture_default_str()
+        ->type_name("S");
+    sub->add_option("--mask", choices.mask, "EXR or PNG of the same size: only texels whose first channel is above 0")
+        ->type_name("FILE");
+    sub->add_flag(
+        "--edges", choices.with_edges,
+        "Also texels at borders of charts, emitters and footprints, where bakers differ in what they average");
+    CLI::Option* error =
+        sub->add_option("--error", choices.error,
+                        "EXR of MAP's standard errors, error_N.exr of a bake: also says how well they hold")
+            ->type_name("FILE");
+    sub->add_option("--reference-error", choices.reference_error, "EXR of REFERENCE's own standard errors")
+        ->needs(error)
+        ->type_name("FILE");
+    sub->add_option("-o,--out", choices.picture, "Picture of the differences: PNG")->type_name("FILE");
+    sub->add_flag("--json", line_.json, "Print one JSON object on stdout");
+  }
+
+  static std::string check_scale(const std::string& text) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const bool is_number = !text.empty() && *end == '\0' && value > 0 && value <= std::numeric_limits<double>::max();
+    return is_number ? "" : "'" + text + "' is not a number above 0";
   }
 
   CommandLine line_;

@@ -9,7 +9,7 @@
 
 namespace radbake::cli {
 
-enum class Command { kSubmit, kPlan, kList, kWatch, kCancel, kDownload, kCapabilities };
+enum class Command { kSubmit, kPlan, kList, kWatch, kCancel, kDownload, kCapabilities, kCompare };
 
 using options::BakeChoices;
 
@@ -20,6 +20,16 @@ enum class Encoding { kExr, kHdr, kRgbmPng };
 struct FileChoices {
   std::vector<Encoding> encodings = {Encoding::kExr};  ///< of the lightmaps, each once
   bool vertex_colors = false;                          ///< light by vertex as COLOR_0 too
+};
+
+/// Which lightmaps are compared, and how. Empty: not given.
+struct CompareChoices {
+  std::filesystem::path reference, map;
+  std::filesystem::path mask;
+  std::filesystem::path error, reference_error;  ///< standard errors of each
+  std::filesystem::path picture;
+  bool with_edges = false;
+  double scale = 1;  ///< of the map
 };
 
 /// A valid command line.
@@ -35,6 +45,7 @@ struct CommandLine {
   FileChoices files;             ///< submit, download
   bool dry_run = false;          ///< submit
   double plan_seconds = 60;      ///< plan: how long to wait for the answer
+  CompareChoices compare;        ///< compare
 
   /// Nothing is baked and nothing written.
   bool only_plans() const { return command == Command::kPlan || dry_run; }

@@ -20,6 +20,8 @@ struct ImageCodec {
   decltype(&image::write_hdr) write_hdr;
   decltype(&image::write_rgbm_png) write_rgbm_png;
   decltype(&image::encode_linear_png) encode_linear_png;
+  decltype(&image::read_exr) read_exr;
+  decltype(&image::write_png) write_png;
 };
 
 /// The one symbol of the library: a function that returns its table, which lives as long as the process.

@@ -6,6 +6,7 @@ extern "C" __attribute__((visibility("default"))) const radbake::image::ImageCod
   using namespace radbake;
   static const image::ImageCodec codec{kEngineVersion,         &image::decode_image,      &image::read_environment,
                                        &image::write_exr,      &image::write_preview_png, &image::write_hdr,
-                                       &image::write_rgbm_png, &image::encode_linear_png};
+                                       &image::write_rgbm_png, &image::encode_linear_png, &image::read_exr,
+                                       &image::write_png};
   return &codec;
 }

@@ -205,6 +205,12 @@ Result<std::string> encode_linear_png(int width, int height, int channels, std::
   return std::string(bytes->begin(), bytes->end());
 }
 
+Result<void> write_png(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgb) {
+  RADBAKE_RETURN_IF_ERROR(check_shape(path, width, height, 3, 3, rgb.size()));
+  const OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT8);
+  return encode(path, spec, OIIO::TypeDesc::UINT8, rgb.data());
+}
+
 Result<Pixels> read_exr(const std::filesystem::path& path) {
   try {
     set_up_oiio();

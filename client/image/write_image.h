@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -53,6 +54,10 @@ Result<void> write_rgbm_png(const std::filesystem::path& path, int width, int he
 /// Shapes: as write_exr, channels 3 or 4. Errors: as write_exr. Precondition: intensity > 0.
 Result<std::string> encode_linear_png(int width, int height, int channels, std::span<const float> values,
                                       double intensity);
+
+/// Writes a picture as it is: PNG, 8 bits, opaque.
+/// Shapes: rgb [height * width * 3], sRGB, rows from the top. Errors: as write_exr.
+Result<void> write_png(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgb);
 
 /// Pixels of an image file. Shapes: values [height * width * channels], rows from the top.
 struct Pixels {

@@ -248,5 +248,26 @@ TEST_F(Options, TellsItsVersion) {
   EXPECT_THAT(exit.out, HasSubstr(std::string("radbake ") + kEngineVersion + " (protocol 1."));
 }
 
+TEST_F(Options, ReadsWhatIsCompared) {
+  const CommandLine line =
+      accepted({"compare", "reference.exr", "map.exr", "--scale", "0.5", "--mask", "mask.png", "--edges", "--error",
+                "error.exr", "--reference-error", "own.exr", "-o", "difference.png", "--json"});
+  EXPECT_EQ(line.command, Command::kCompare);
+  EXPECT_EQ(line.compare.reference, "reference.exr");
+  EXPECT_EQ(line.compare.map, "map.exr");
+  EXPECT_EQ(line.compare.scale, 0.5);
+  EXPECT_EQ(line.compare.mask, "mask.png");
+  EXPECT_TRUE(line.compare.with_edges);
+  EXPECT_EQ(line.compare.error, "error.exr");
+  EXPECT_EQ(line.compare.reference_error, "own.exr");
+  EXPECT_EQ(line.compare.picture, "difference.png");
+  EXPECT_TRUE(line.json);
+  EXPECT_FALSE(accepted({"compare", "reference.exr", "map.exr"}).compare.with_edges);
+  for (const char* scale : {"0", "-1", "nan", "1e999", "half"}) {
+    EXPECT_THAT(refused({"compare", "reference.exr", "map.exr", "--scale", scale}).err, HasSubstr(scale));
+  }
+  EXPECT_EQ(refused({"compare", "reference.exr"}).code, kUsage);
+}
+
 }  // namespace
 }  // namespace radbake::cli

@@ -59,7 +59,9 @@ Result<void> run(const std::string& path, const BakeOptions& options, int runs) 
     const std::vector<Vec3> radiosity(patches.size(), Vec3{1, 1, 1});
     const SentLight sent{radiosity};
     const GatherScene scene{surfaces, visibility, estimator, direct, std::span(&sent, 1), read.scene.sky, 0};
-    gather_lightmap(scene, *prepared->atlas, {}, {}, {});
+    LightmapGather gather(surfaces, *prepared->atlas, visibility, 1, false, false);
+    GatherCounts counts;
+    gather.add_pass({scene, scene, kLightSamplesPerTexel, {}, 1}, {}, {}, {}, counts);
   });
   return {};
 }

@@ -1,109 +1,181 @@
 #include "server/radiosity/bake/bake.h"
 
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
-
+#include <algorithm>
 #include <optional>
-#include <thread>
 
 #include "server/radiosity/bake/lightmap_layers.h"
+#include "server/radiosity/bake/on_threads.h"
 #include "server/radiosity/bake/patch_light.h"
 #include "server/radiosity/bake/pilot.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
+#include "server/radiosity/error/light_error.h"
 #include "server/radiosity/gather/gather.h"
 #include "server/radiosity/gather/gather_vertices.h"
+#include "server/radiosity/plan/pass_plan.h"
 
 namespace radbake::radiosity {
 namespace {
 
-enum Purpose : std::uint64_t { kReplicate = 71 };
+enum Purpose : std::uint64_t { kReplicate = 71, kPass = 72 };
+
+/// Where texels adapt, the most shadow rays one gets, over the mean.
+constexpr int kMostLightSamples = 16;
 
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
-/// One bake, stage after stage, on the threads of the arena that it runs in.
+/// One bake, pass after pass, on the threads of the arena that it runs in.
 class Bake {
  public:
-  Bake(const Scene& scene, const Preparation& prepared, ProgressMeter& progress, std::stop_token stop)
+  Bake(const Scene& scene, Preparation& prepared, ProgressMeter& progress, std::stop_token stop, std::stop_token finish)
       : scene_(scene),
         options_(prepared.options),
-        num_ray_channels_(prepared.num_ray_channels()),
         prepared_(prepared),
         surfaces_(prepared.surveyed.surfaces),
         progress_(progress),
-        stop_(stop) {}
+        stop_(stop),
+        finish_(finish) {
+    if (prepared.atlas) {
+      lightmaps_.emplace(surfaces_, *prepared.atlas, prepared.shadows(), prepared.plan.spacing,
+                         options_.wants_direct || options_.wants_indirect, options_.wants_ao);
+    }
+    if (prepared.groups) vertices_.emplace(surfaces_, *prepared.groups);
+  }
 
   Result<BakeOutcome> run() {
-    outcome_.report.plan = prepared_.plan;
-    outcome_.report.warnings = prepared_.plan.warnings;
-    outcome_.report.num_patches = prepared_.patches.size();
+    BakeReport& report = outcome_.report;
+    report.plan = prepared_.plan;
+    report.warnings = prepared_.plan.warnings;
+    report.num_patches = prepared_.patches.size();
+    report.instruction_set = prepared_.visibility->instruction_set();
 
-    outcome_.report.instruction_set = prepared_.visibility->instruction_set();
-    const int num_channels = num_ray_channels_;
-    RADBAKE_ASSIGN_OR_RETURN(const std::vector<PatchLight> patch_light, solve_replicates());
-    std::vector<SentLight> sent;
-    for (int r = 0; r < kMaxReplicates; ++r) {
-      const PatchLight& own = patch_light[static_cast<std::size_t>(r) % patch_light.size()];
-      sent.push_back(
-          {own.radiosity, options_.wants_direct || options_.wants_indirect ? own.glow : std::span<const Vec3>{}});
+    if (!is_progressive()) {
+      RADBAKE_RETURN_IF_ERROR(run_pass(prepared_.plan.first_pass, 1));
+    } else {
+      // A first pass is a third of a bake, or so: nobody knows before it has told its error.
+      constexpr double kFirstShare = 0.3;
+      RADBAKE_RETURN_IF_ERROR(run_pass(prepared_.plan.first_pass, kFirstShare));
+      results_.direct_effort = results_.gathered_effort = 1;
+      results_.last_direct_scale = results_.last_gathered_scale = 1;
+      RADBAKE_RETURN_IF_ERROR(refine());
     }
-
-    const DirectLight direct(surfaces_, prepared_.shadows(), kLightSamplesPerTexel, Environment::Part::kBright);
-    const double ao_distance = options_.ao_distance > 0 ? options_.ao_distance : kDefaultAoDistance;
-    std::vector<HemisphereEstimator> rows;
-    for (int channel = 0; channel < num_channels; ++channel) {
-      rows.emplace_back(surfaces_, prepared_.patches, prepared_.visibility->channel(channel),
-                        prepared_.plan.rays_per_texel, options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0,
-                        kMaxReplicates);
-    }
-    const GatherScene scene{surfaces_,
-                            prepared_.shadows(),
-                            rows[0],
-                            direct,
-                            sent,
-                            surfaces_.sky,
-                            options_.seed,
-                            std::span(rows).subspan(1),
-                            outcome_.report.solver.error_bound};
-    if (!gather(scene)) return cancelled();
-    outcome_.report.stages = progress_.stage_times();
+    complete();
+    report.stages = progress_.stage_times();
     return std::move(outcome_);
   }
 
  private:
+  bool is_progressive() const { return options_.max_error > 0 || options_.time_budget_seconds > 0; }
+
+  /// Passes until the target holds or the time is up.
+  Result<void> refine() {
+    for (;;) {
+      results_.seconds_left =
+          options_.time_budget_seconds > 0
+              ? std::max(0.0, options_.time_budget_seconds - progress_.seconds() - seconds_to_complete())
+              : -1;
+      NoPass no_pass;
+      const auto next = plan_next_pass(results_, options_.max_error, no_pass);
+      outcome_.report.error.limited_by = no_pass.limited_by;
+      if (!next) return {};
+      if (finish_.stop_requested()) {
+        outcome_.report.error.limited_by = "stopped";
+        return {};
+      }
+      outcome_.report.error.predicted = next->predicted_error;
+      RADBAKE_RETURN_IF_ERROR(run_pass(next->settings, next->share_of_rest));
+      results_.direct_effort += next->direct_scale;
+      results_.gathered_effort += next->gathered_scale;
+      results_.last_direct_scale = next->direct_scale;
+      results_.last_gathered_scale = next->gathered_scale;
+    }
+  }
+
+  /// What filling, levelling and writing may take after the last pass, wall seconds.
+  double seconds_to_complete() const {
+    constexpr double kLeast = 0.03, kPerPixel = 0.3e-6;
+    return kLeast + (lightmaps_ ? kPerPixel * static_cast<double>(lightmaps_->facts().size()) : 0);
+  }
+
+  /// The light of the patches, and the light that arrives from them.
+  Result<void> run_pass(const PassSettings& settings, double share_of_rest) {
+    const int index = results_.num_passes;
+    const double began = progress_.seconds();
+    const std::uint64_t seed =
+        index == 0 ? options_.seed : seed_of(options_.seed, kPass, static_cast<std::uint64_t>(index));
+    const auto num_patches = static_cast<double>(prepared_.patches.num_cells());
+    const auto num_receivers = static_cast<double>(prepared_.plan.num_texels + prepared_.plan.num_vertex_groups);
+    progress_.begin_pass(index, share_of_rest, num_patches * (settings.rays_per_row + settings.patch_light_samples),
+                         num_receivers * (settings.rays_per_texel + settings.light_samples));
+
+    PassSummary summary;
+    summary.num_patches = prepared_.patches.size();
+    summary.rays_per_row = settings.rays_per_row;
+    summary.rays_per_texel = settings.rays_per_texel;
+    summary.light_samples_per_texel = settings.light_samples;
+    RADBAKE_ASSIGN_OR_RETURN(const std::vector<PatchLight> light, solve_replicates(settings, seed, summary));
+    if (!gather(settings, seed, light, summary)) return cancelled();
+
+    const LightError error = current_error();
+    results_.error = error.relative_rmse;
+    results_.direct_sampling = error.direct_sampling;
+    results_.gathered_sampling = error.gathered_sampling;
+    results_.discretisation = error.discretisation;
+    results_.algebraic = error.algebraic;
+    ++results_.num_passes;
+    results_.last_seconds = progress_.seconds() - began;
+    summary.relative_rmse = error.relative_rmse;
+    summary.interval_low = error.low;
+    summary.interval_high = error.high;
+    summary.seconds = progress_.seconds();
+    summary.cpu_seconds = progress_.cpu_seconds();
+    outcome_.report.passes.push_back(summary);
+    progress_.end_pass(error.relative_rmse, error.low, error.high);
+    return {};
+  }
+
+  LightError current_error() const {
+    const double algebraic = outcome_.report.solver.error_bound;
+    if (lightmaps_) return estimate_error(*lightmaps_, algebraic);
+    return estimate_error(
+        vertices_->estimate(), [&](std::size_t g) { return vertices_->is_known()[g] != 0; },
+        [](std::size_t g) { return g; }, algebraic, 0);
+  }
+
   /// The replicates of the patches' light: several where rows are sampled.
-  Result<std::vector<PatchLight>> solve_replicates() {
+  Result<std::vector<PatchLight>> solve_replicates(const PassSettings& settings, std::uint64_t seed,
+                                                   PassSummary& summary) {
     BakeReport& report = outcome_.report;
     const int num = num_replicates_of(report.plan.form_factors);
     const auto total_num = static_cast<std::uint64_t>(num);
     std::vector<ReplicateSystem> systems;
     for (int r = 0; r < num; ++r) {
       const auto index = static_cast<std::uint64_t>(r);
-      const SystemSettings settings{seed_of(options_.seed, kReplicate, index), report.plan.rays_per_row / num,
-                                    kLightSamplesPerPatch / num};
-      RADBAKE_ASSIGN_OR_RETURN(ReplicateSystem system, estimate_system(
-                                                           prepared_, settings,
-                                                           [&](std::uint64_t done, std::uint64_t total) {
-                                                             progress_.report(BakeStage::kFormFactors,
-                                                                              total * index + done, total * total_num);
-                                                           },
-                                                           stop_));
-      report.num_row_rays += system.report.num_row_rays;
-      report.num_light_rays += system.report.num_light_rays;
+      const SystemSettings own{seed_of(seed, kReplicate, index), settings.rays_per_row / num,
+                               settings.patch_light_samples / num};
+      const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
+        progress_.report(BakeStage::kFormFactors, total * index + done, total * total_num);
+      };
+      RADBAKE_ASSIGN_OR_RETURN(ReplicateSystem system, estimate_system(prepared_, own, on_row, stop_));
+      summary.num_row_rays += system.report.num_row_rays;
+      summary.num_light_rays += system.report.num_light_rays;
       systems.push_back(std::move(system));
     }
     progress_.report(BakeStage::kSolving, 0, 0);
+    results_.gathered_rays += static_cast<double>(summary.num_row_rays + summary.num_light_rays);
+    const auto on_step = [&](std::uint64_t steps, double bound) {
+      progress_.report(BakeStage::kSolving, steps, 0, bound);
+    };
     std::vector<PatchLight> light;
     for (ReplicateSystem& system : systems) {
-      RADBAKE_ASSIGN_OR_RETURN(PatchLight own, solve_patch_light(
-                                                   prepared_, system,
-                                                   [&](std::uint64_t steps, double bound) {
-                                                     progress_.report(BakeStage::kSolving, steps, 0, bound);
-                                                   },
-                                                   stop_));
+      RADBAKE_ASSIGN_OR_RETURN(PatchLight own, solve_patch_light(prepared_, system, on_step, stop_));
+      own.coarser = averaged(own.radiosity);
       light.push_back(std::move(own));
     }
-    // Of several replicates, the report shows the first.
+    report.num_row_rays += summary.num_row_rays;
+    report.num_light_rays += summary.num_light_rays;
+    if (results_.num_passes > 0) return light;
+    // Of several replicates and passes, the report shows the first.
     const PatchLightReport& first = systems.front().report;
     report.transport = first.transport;
     report.solver = first.solver;
@@ -112,42 +184,140 @@ class Bake {
     return light;
   }
 
-  /// Radiosity -> lightmaps and light by vertex; false when it was stopped.
-  bool gather(const GatherScene& scene) {
+  /// What patches twice as large would send: the mean of their parts, weighted by area.
+  std::vector<Vec3> averaged(const std::vector<Vec3>& radiosity) {
+    const Patches& patches = prepared_.patches;
+    if (twice_as_large_.empty()) twice_as_large_ = patches.twice_as_large();
+    std::vector<Vec3> flux(radiosity.size());
+    std::vector<double> area(radiosity.size(), 0);
+    for (std::uint32_t patch = 0; patch < radiosity.size(); ++patch) {
+      flux[twice_as_large_[patch]] += radiosity[patch] * patches.area(patch);
+      area[twice_as_large_[patch]] += patches.area(patch);
+    }
+    std::vector<Vec3> means;
+    means.reserve(radiosity.size());
+    for (std::uint32_t patch = 0; patch < radiosity.size(); ++patch) {
+      const std::uint32_t larger = twice_as_large_[patch];
+      means.push_back(area[larger] > 0 ? flux[larger] / area[larger] : radiosity[patch]);
+    }
+    return means;
+  }
+
+  /// The light of the patches -> one more pass of lightmaps and light by vertex; false when it was stopped.
+  bool gather(const PassSettings& settings, std::uint64_t seed, const std::vector<PatchLight>& light,
+              PassSummary& summary) {
+    std::vector<SentLight> sent;
+    for (int r = 0; r < kMaxReplicates; ++r) {
+      const PatchLight& own = light[static_cast<std::size_t>(r) % light.size()];
+      sent.push_back({own.radiosity, own.glow, own.coarser});
+    }
+    const bool adapts = lightmaps_ && results_.num_passes > 0;
+    const int most_samples = settings.light_samples * (adapts ? kMostLightSamples : 1);
+    const DirectLight direct(surfaces_, prepared_.shadows(), most_samples, Environment::Part::kBright);
+    const double ao_distance = options_.ao_distance > 0 ? options_.ao_distance : kDefaultAoDistance;
+    const auto estimators = [&](int rays) {
+      std::vector<HemisphereEstimator> of_channel;
+      for (int channel = 0; channel < prepared_.num_ray_channels(); ++channel) {
+        of_channel.emplace_back(surfaces_, prepared_.patches, prepared_.visibility->channel(channel), rays,
+                                options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0, kMaxReplicates);
+      }
+      return of_channel;
+    };
+    const std::vector<HemisphereEstimator> of_texels = estimators(settings.rays_per_texel);
+    const std::vector<HemisphereEstimator> of_nodes = estimators(settings.rays_per_node);
+    const auto scene_of = [&](const std::vector<HemisphereEstimator>& rows) {
+      return GatherScene{surfaces_,
+                         prepared_.shadows(),
+                         rows[0],
+                         direct,
+                         sent,
+                         surfaces_.sky,
+                         seed,
+                         std::span(rows).subspan(1),
+                         outcome_.report.solver.error_bound};
+    };
+    const GatherScene alone = scene_of(of_texels), nodes = scene_of(of_nodes);
+    std::vector<std::uint8_t> levels;
+    if (adapts) levels = light_levels(*lightmaps_, settings.light_samples, most_samples);
+
     const std::uint64_t num_receivers = prepared_.plan.num_texels + prepared_.plan.num_vertex_groups;
     progress_.report(BakeStage::kGathering, 0, num_receivers);
-    if (prepared_.atlas && !gather_texels(scene, *prepared_.atlas, num_receivers)) return false;
-    GatheredVertices vertices;
-    if (prepared_.groups) {
-      vertices = gather_vertices(
-          scene, *prepared_.groups,
+    GatherCounts counts;
+    if (lightmaps_) {
+      const Atlas& atlas = *prepared_.atlas;
+      const GatherPass pass{alone, nodes, settings.light_samples, levels, settings.gathered_weight};
+      const int index = results_.num_passes;
+      lightmaps_->add_pass(
+          pass,
+          [&](const GatheredTile& tile) {
+            progress_.tile({tile.sheet, index, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba,
+                            lightmap_name(tile.sheet), atlas.width(), atlas.height()});
+            progress_.report(BakeStage::kGathering, tile.texels_done, num_receivers);
+          },
+          stop_, index > 0 ? finish_ : std::stop_token{}, counts);
+    }
+    if (vertices_) {
+      vertices_->add_pass(
+          alone, settings.light_samples, settings.gathered_weight,
           [&](std::uint64_t done) {
             progress_.report(BakeStage::kGathering, prepared_.plan.num_texels + done, num_receivers);
           },
-          stop_);
-      if (vertices.is_cancelled) return false;
+          stop_, counts);
     }
-    describe_meshes(vertices);
+    if (stop_.stop_requested()) return false;
+    summary.num_gather_rays = counts.num_rays;
+    summary.num_light_rays += counts.num_light_rays;
+    summary.num_gathered = counts.num_gathered;
+    outcome_.report.num_gather_rays += counts.num_rays;
+    outcome_.report.num_light_rays += counts.num_light_rays;
+    results_.gathered_rays += static_cast<double>(counts.num_rays);
+    results_.direct_rays += static_cast<double>(counts.num_light_rays);
     return true;
   }
 
-  bool gather_texels(const GatherScene& scene, const Atlas& atlas, std::uint64_t num_receivers) {
+  /// Fills and levels what the passes found, and tells what it is off by.
+  void complete() {
     BakeReport& report = outcome_.report;
-    GatheredMap map = gather_lightmap(
-        scene, atlas, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
-        [&](const GatheredTile& tile) {
-          progress_.tile({tile.sheet, 0, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba,
-                          lightmap_name(tile.sheet), atlas.width(), atlas.height()});
-          progress_.report(BakeStage::kGathering, tile.texels_done, num_receivers);
-        },
-        stop_);
-    if (map.is_cancelled) return false;
-    report.num_gather_rays += map.num_rays;
-    report.num_light_rays += map.num_light_rays;
-    report.energy.mean_irradiance = map.mean_irradiance;
+    const LightError error = current_error();
+    tell_error(error);
+    if (lightmaps_) {
+      const std::vector<float> errors = standard_errors(*lightmaps_);
+      tell_worst(find_worst(*lightmaps_, errors, error.mean_irradiance));
+      report.energy.mean_irradiance = lightmaps_->mean_irradiance();
+      report.lightmap =
+          append_layers(surfaces_, *lightmaps_, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
+                        errors, outcome_.layers);
+    }
+    GatheredVertices vertices;
+    if (vertices_) vertices = finish_vertices(surfaces_, *prepared_.groups, *vertices_);
+    describe_meshes(vertices);
+  }
 
-    report.lightmap = append_layers(surfaces_, atlas, map, outcome_.layers);
-    return true;
+  void tell_error(const LightError& error) {
+    ErrorSummary& summary = outcome_.report.error;
+    summary.relative_rmse = error.relative_rmse;
+    summary.interval_low = error.low;
+    summary.interval_high = error.high;
+    summary.algebraic = error.algebraic;
+    summary.sampling = error.sampling;
+    summary.discretisation = error.discretisation;
+    summary.asked = options_.max_error;
+    summary.is_reached = options_.max_error > 0 && error.relative_rmse <= options_.max_error;
+    if (summary.is_reached) summary.limited_by.clear();
+    summary.num_texels = error.num_receivers;
+  }
+
+  void tell_worst(const WorstPlace& place) {
+    const Atlas& atlas = lightmaps_->atlas();
+    const auto width = static_cast<std::size_t>(atlas.width()), height = static_cast<std::size_t>(atlas.height());
+    ErrorSummary::Worst& worst = outcome_.report.error.worst;
+    worst.error = place.error;
+    worst.lightmap = static_cast<int>(place.texel / width / height);
+    worst.x = static_cast<int>(place.texel % width);
+    worst.y = static_cast<int>(place.texel / width % height);
+    Footprint footprint;
+    atlas.footprint(worst.x, static_cast<int>(place.texel / width), footprint);
+    if (!footprint.is_empty()) worst.mesh = surfaces_.mesh(footprint.pieces.front().triangle).name;
   }
 
   void describe_meshes(const GatheredVertices& vertices) {
@@ -156,8 +326,6 @@ class Bake {
     std::optional<VertexLight> light;
     if (prepared_.groups) {
       light.emplace(VertexLight{*prepared_.groups, vertices.irradiance});
-      report.num_gather_rays += vertices.num_rays;
-      report.num_light_rays += vertices.num_light_rays;
       report.vertices.num_groups = prepared_.groups->size();
       report.vertices.num_groups_filled = vertices.num_filled;
       if (!prepared_.atlas) report.energy.mean_irradiance = vertices.mean_irradiance;
@@ -170,50 +338,35 @@ class Bake {
 
   const Scene& scene_;
   const BakeOptions& options_;
-  const int num_ray_channels_;
-  const Preparation& prepared_;
+  Preparation& prepared_;
   const Surfaces& surfaces_;
   ProgressMeter& progress_;
-  std::stop_token stop_;
+  std::stop_token stop_, finish_;
+  std::optional<LightmapGather> lightmaps_;
+  std::optional<VertexGather> vertices_;
+  std::vector<std::uint32_t> twice_as_large_;  ///< [patches]
+  PassResults results_;
   BakeOutcome outcome_;
 };
-
-/// Rays that the two traced stages will take, to share the progress between them.
-double row_rays(const BakePlan& plan, const Patches& patches) {
-  return static_cast<double>(patches.num_cells()) * (plan.rays_per_row + kLightSamplesPerPatch);
-}
-double gather_rays(const BakePlan& plan) {
-  return static_cast<double>(plan.num_texels + plan.num_vertex_groups) *
-         (plan.rays_per_texel + plan.light_samples_per_texel);
-}
 
 }  // namespace
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
                                std::stop_token stop, std::stop_token finish) {
-  const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
-  // An arena of more threads than cores is allowed: results do not depend on the number.
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  tbb::task_arena arena(threads);
-  std::optional<Result<BakeOutcome>> outcome;
-  arena.execute([&] {
+  return on_threads(options.threads, [&]() -> Result<BakeOutcome> {
     const ProgressMeter::Start start;
     observer.on_progress({});
-    auto prepared = prepare_scene(scene, options, stop);
-    if (!prepared.ok()) {
-      outcome.emplace(prepared.error());
-      return;
-    }
-    const Preparation& ready = **prepared;
-    const Prediction prediction = predict_bake(ready, process_cpu_seconds() - start.cpu_seconds, stop);
-    ProgressMeter progress(observer, start, row_rays(ready.plan, ready.patches), gather_rays(ready.plan));
-    outcome.emplace(Bake(scene, ready, progress, stop).run());
-    if (!outcome->ok()) return;
-    BakeReport& report = (*outcome)->report;
-    report.prediction = prediction;
-    report.costs = measured_costs(report);
+    RADBAKE_ASSIGN_OR_RETURN(const std::unique_ptr<Preparation> prepared, prepare_scene(scene, options, stop));
+    const bool is_progressive = options.max_error > 0 || options.time_budget_seconds > 0;
+    Prediction prediction;
+    if (!is_progressive) prediction = predict_bake(*prepared, process_cpu_seconds() - start.cpu_seconds, stop);
+    ProgressMeter progress(observer, start, options.max_error);
+    auto outcome = Bake(scene, *prepared, progress, stop, finish).run();
+    if (!outcome.ok()) return outcome;
+    outcome->report.prediction = prediction;
+    outcome->report.costs = measured_costs(outcome->report);
+    return outcome;
   });
-  return std::move(*outcome);
 }
 
 }  // namespace radbake::radiosity

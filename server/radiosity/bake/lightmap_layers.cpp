@@ -1,5 +1,6 @@
 #include "server/radiosity/bake/lightmap_layers.h"
 
+#include <algorithm>
 #include <span>
 
 #include "server/radiosity/lightmap/fill.h"
@@ -10,8 +11,9 @@ namespace {
 
 constexpr int kPadding = 2;  ///< texels around charts that get their neighbours' mean
 
-/// What one kind of layer shows.
+/// What one kind of layer shows; its name is prefix + number of the sheet + suffix.
 struct Kind {
+  const char* prefix;
   const char* suffix;
   const char* quantity;
   const char* unit;
@@ -24,7 +26,7 @@ struct Finish {
 };
 
 Finish append_layer(const Surfaces& surfaces, const Atlas& atlas, const std::vector<TexelState>& states,
-                    const Kind& kind, std::vector<float>& rgba, std::vector<Layer>& layers) {
+                    const Kind& kind, bool levels_seams, std::vector<float> rgba, std::vector<Layer>& layers) {
   Finish finish;
   const auto sheet_texels = static_cast<std::size_t>(atlas.width()) * atlas.height();
   for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
@@ -34,27 +36,51 @@ Finish append_layer(const Surfaces& surfaces, const Atlas& atlas, const std::vec
     finish.fill.num_filled += counts.num_filled;
     finish.fill.num_dilated += counts.num_dilated;
   }
-  finish.seams = level_seams(surfaces, atlas.layout(), states, rgba);
+  if (levels_seams) finish.seams = level_seams(surfaces, atlas.layout(), states, rgba);
   for (int sheet = 0; sheet < atlas.num_sheets(); ++sheet) {
     const auto first = rgba.begin() + static_cast<std::ptrdiff_t>(4 * sheet_texels) * sheet;
-    layers.push_back({lightmap_name(sheet) + kind.suffix, kind.quantity, kind.unit, atlas.width(), atlas.height(), 4,
+    layers.push_back({kind.prefix + std::to_string(sheet) + kind.suffix, kind.quantity, kind.unit, atlas.width(),
+                      atlas.height(), 4,
                       std::vector<float>(first, first + static_cast<std::ptrdiff_t>(4 * sheet_texels))});
   }
-  rgba = {};
   return finish;
 }
 
 }  // namespace
 
-LightmapSummary append_layers(const Surfaces& surfaces, const Atlas& atlas, GatheredMap& map,
-                              std::vector<Layer>& layers) {
-  const auto append = [&](const Kind& kind, std::vector<float>& rgba) {
-    return append_layer(surfaces, atlas, map.states, kind, rgba, layers);
+LightmapSummary append_layers(const Surfaces& surfaces, const LightmapGather& gather, WantedLayers wanted,
+                              std::vector<float> standard_errors, std::vector<Layer>& layers) {
+  const Atlas& atlas = gather.atlas();
+  const LightEstimate& light = gather.estimate();
+  const std::vector<TexelFacts>& facts = gather.facts();
+  std::vector<TexelState> states;
+  states.reserve(facts.size());
+  for (const TexelFacts& texel : facts) states.push_back(texel.state);
+  const auto append = [&](const Kind& kind, const auto& value_of) {
+    std::vector<float> rgba(4 * facts.size());
+    for (std::size_t i = 0; i < facts.size(); ++i) {
+      const Vec3 value = value_of(i);
+      for (int c = 0; c < 3; ++c) rgba[4 * i + static_cast<std::size_t>(c)] = static_cast<float>(value[c]);
+      rgba[4 * i + 3] = facts[i].coverage;
+    }
+    return append_layer(surfaces, atlas, states, kind, true, std::move(rgba), layers);
   };
-  const Finish all = append({"", "irradiance", "lx"}, map.rgba);
-  if (!map.direct.empty()) append({"_direct", "irradiance", "lx"}, map.direct);
-  if (!map.indirect.empty()) append({"_indirect", "irradiance", "lx"}, map.indirect);
-  if (!map.openness.empty()) append({"_ao", "openness", "1"}, map.openness);
+  const Finish all = append({"lightmap_", "", "irradiance", "lx"}, [&](std::size_t i) { return light.irradiance(i); });
+  if (wanted.direct) {
+    append({"lightmap_", "_direct", "irradiance", "lx"}, [&](std::size_t i) {
+      // What is not indirect: rounding must not make it negative.
+      const Vec3 direct = light.irradiance(i) - light.reflected(i);
+      return Vec3{std::max(direct.x, 0.0), std::max(direct.y, 0.0), std::max(direct.z, 0.0)};
+    });
+  }
+  if (wanted.indirect) {
+    append({"lightmap_", "_indirect", "irradiance", "lx"}, [&](std::size_t i) { return light.reflected(i); });
+  }
+  if (wanted.openness) {
+    append({"lightmap_", "_ao", "openness", "1"}, [&](std::size_t i) { return Vec3{1, 1, 1} * light.openness(i); });
+  }
+  append_layer(surfaces, atlas, states, {"error_", "", "standard_error", "lx"}, false, std::move(standard_errors),
+               layers);
 
   LightmapSummary summary;
   summary.num_texels_filled = all.fill.num_filled;

@@ -118,7 +118,7 @@ Result<PatchLight> solve_patch_light(const Preparation& prepared, ReplicateSyste
       replicate.report.solver.status = "converged";
       own = system->glow;
     }
-    if (num_channels == 1) return PatchLight{std::move(own), std::move(system->glow)};
+    if (num_channels == 1) return PatchLight{std::move(own), std::move(system->glow), {}};
     light.radiosity.resize(own.size());
     light.glow.resize(own.size());
     for (std::size_t i = 0; i < own.size(); ++i) {

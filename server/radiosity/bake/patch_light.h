@@ -17,6 +17,7 @@ namespace radbake::radiosity {
 struct PatchLight {
   std::vector<Vec3> radiosity;  ///< B'
   std::vector<Vec3> glow;       ///< E_in
+  std::vector<Vec3> coarser;    ///< B' of patches twice as large
 };
 
 /// What one replicate was made of, for the report; of several channels with rows of their own, the first's.

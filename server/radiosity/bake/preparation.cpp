@@ -7,6 +7,7 @@
 #include "server/radiosity/bake/cpu_clock.h"
 #include "server/radiosity/bake/on_threads.h"
 #include "server/radiosity/bake/pilot.h"
+#include "server/radiosity/gather/receive.h"
 #include "server/radiosity/survey/probe.h"
 #include "server/radiosity/threads/for_each_range.h"
 
@@ -121,6 +122,21 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.rays_per_row = std::max(plan.rays_per_texel, kMinRays * num_replicates_of(FormFactors::kHemisphere));
   plan.light_samples_per_texel =
       std::count(surfaces.is_emitter.begin(), surfaces.is_emitter.end(), 1) > 0 ? kLightSamplesPerTexel : 0;
+  if (options.max_error > 0 || options.time_budget_seconds > 0) {
+    plan.spacing = options.spacing > 0 ? options.spacing : kProgressiveSpacing;
+    plan.first_pass = pass_of(1, 1);
+    plan.rays_per_row = plan.first_pass.rays_per_row;
+    plan.rays_per_texel = plan.first_pass.rays_per_texel;
+  } else {
+    plan.spacing = options.spacing > 0 ? options.spacing : 1;
+    plan.first_pass = {
+        plan.rays_per_row,
+        kLightSamplesPerPatch,
+        plan.rays_per_texel,
+        plan.rays_per_texel * plan.spacing,
+        options.light_samples > 0 ? options.light_samples / kMaxReplicates * kMaxReplicates : kLightSamplesPerTexel,
+        1};
+  }
   choose_methods(options, plan);
   if (prepared->opacity &&
       (plan.form_factors == FormFactors::kAnalytic || plan.form_factors == FormFactors::kAdaptive)) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <mutex>
 
@@ -8,8 +9,8 @@
 
 namespace radbake::radiosity {
 
-/// Turns the steps of the stages into one fraction that never falls, and a time left.
-/// The stages' shares are their numbers of rays; the estimate corrects itself as the bake goes on.
+/// Turns the steps of the stages of all passes into one fraction that never falls, and a time left.
+/// Within a pass the stages' shares are their numbers of rays; the estimate corrects itself as the bake goes on.
 class ProgressMeter {
  public:
   using Clock = std::chrono::steady_clock;
@@ -20,30 +21,37 @@ class ProgressMeter {
     double cpu_seconds = process_cpu_seconds();
   };
 
-  /// The bake began at `start`; it is prepared and its rays are known by now.
-  ProgressMeter(BakeObserver& observer, const Start& start, double row_rays, double gather_rays);
+  /// The bake began at `start`; it is prepared by now.
+  ProgressMeter(BakeObserver& observer, const Start& start, double asked_error);
 
-  /// From any thread. Calls the observer at most about 20 times a second, and at the end of each stage.
+  /// A pass begins that takes a share of all that is left.
+  void begin_pass(int pass, double share_of_rest, double row_rays, double gather_rays);
+  /// From any thread. Calls the observer at most about 20 times a second, and at the end of each stage. Stages of later
+  /// passes are all told as kGathering: what the caller sees never goes back.
   void report(BakeStage stage, std::uint64_t done, std::uint64_t total, double residual = 0);
+  /// The map's error as the pass that ends leaves it.
+  void end_pass(double relative_error, double low, double high);
   /// Calls the observer with a tile, apart from all other calls.
   void tile(const Tile& tile);
-  /// The wall and CPU times of the stages that have ended and of the one that runs.
+  /// The wall and CPU times of the stages, of all passes together.
   std::vector<StageTime> stage_times();
+  double seconds() const;
+  double cpu_seconds() const { return process_cpu_seconds() - start_.cpu_seconds; }
 
  private:
   void enter(BakeStage stage);
 
   BakeObserver& observer_;
   std::mutex mutex_;
-  double row_share_;
-  double gather_share_;
-  double fraction_ = 0;
+  Start start_;
+  double pass_begin_ = 0, pass_end_ = 1;  ///< fractions
+  double row_share_ = 0, gather_share_ = 0;
+  BakeProgress progress_;
   BakeStage stage_ = BakeStage::kPreparing;
-  Clock::time_point start_;
   Clock::time_point stage_start_;
   double stage_cpu_start_;
   Clock::time_point last_report_{};
-  std::vector<StageTime> times_;
+  std::array<StageTime, 4> times_;
 };
 
 }  // namespace radbake::radiosity

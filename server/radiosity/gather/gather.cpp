@@ -1,6 +1,9 @@
 #include "server/radiosity/gather/gather.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <mutex>
 
 #include "server/radiosity/threads/for_each_range.h"
@@ -14,139 +17,394 @@ enum Purpose : std::uint64_t { kSitesOfTexel = 11, kRaysOfTexel = 12, kLightOfTe
 /// Side of a tile, texels; twice that in a large atlas.
 constexpr int kTileEdge = 32;
 constexpr int kLargeAtlas = 1024;
-
-/// Buffers of one thread.
-struct Scratch {
-  Footprint footprint;
-  ReceiveScratch receive;
-};
-
-struct Texel {
-  Vec3 irradiance, indirect;
-  double openness = 0;
-  double coverage = 0;
-  double area = 0;
-  TexelState state = TexelState::kOutside;
-  std::uint64_t rays = 0, light_rays = 0;
-};
-
-/// Writes a texel of a layer, where the layer is kept.
-void put(Vec3 value, double coverage, std::size_t at, std::vector<float>& rgba) {
-  if (rgba.empty()) return;
-  for (int c = 0; c < 3; ++c) rgba[4 * at + static_cast<std::size_t>(c)] = static_cast<float>(value[c]);
-  rgba[4 * at + 3] = static_cast<float>(coverage);
-}
-
-Texel gather_texel(const GatherScene& scene, const Atlas& atlas, const SobolPoints& site_points, int x, int y,
-                   Scratch& scratch) {
-  Texel texel;
-  atlas.footprint(x, y, scratch.footprint);
-  if (scratch.footprint.is_empty()) return texel;
-  texel.coverage = scratch.footprint.coverage;
-  texel.area = scratch.footprint.area();
-  const std::uint64_t id = static_cast<std::uint64_t>(y) * atlas.width() + x;
-
-  // Spread the sites over the footprint.
-  scratch.receive.sites.clear();
-  for (int r = 0; r < scene.rows.replicates(); ++r) {
-    const auto seeds =
-        SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfTexel, id) + static_cast<std::uint64_t>(r)));
-    for (int s = 0; s < site_points.size(); ++s) {
-      const SurfacePoint p =
-          scratch.footprint.sample(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds));
-      scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
-    }
+/// A square is interpolated where what its nodes see is further away than this, in lengths of its side.
+constexpr double kNear = 0.75;
+/// Adds the squares of the replicates' distances from their mean, mean of the channels.
+void add_squares(std::span<const Vec3> replicates, Vec3 mean, std::array<double, kMaxReplicates>& squares) {
+  for (std::size_t r = 0; r < replicates.size(); ++r) {
+    const Vec3 off = replicates[r] - mean;
+    squares[r] += mean_component(scaled_by(off, off));
   }
-  const Reception reception =
-      receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive);
-  const ReceivedLight light = reception.mean(scene.rows.replicates());
-  texel.irradiance = light.irradiance();
-  texel.indirect = light.reflected;
-  texel.openness = reception.openness;
-  texel.state = reception.is_buried ? TexelState::kBuried : TexelState::kValid;
-  texel.rays = reception.rays;
-  texel.light_rays = reception.light_rays;
-  return texel;
 }
+
+/// Sites of a texel that gets direct light only.
+constexpr int kMostPlainSites = 16;
+
+using Replicates = std::array<Vec3, kMaxReplicates>;
 
 }  // namespace
 
-GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas, GatherLayers layers,
-                            const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop) {
-  const int width = atlas.width(), height = atlas.height();
+struct LightmapGather::NodeLight {
+  std::array<std::array<float, 3>, kMaxReplicates> gathered{};
+  std::array<float, 3> reflected{};
+  float openness = 0;
+  float coarser_square = 0;
+  float nearest = 0;  ///< harmonic mean of the distances that its rays went, scene units
+  bool sees_light = false;
+  bool is_buried = false;
+};
+
+struct LightmapGather::Scratch {
+  Footprint footprint;
+  ReceiveScratch receive;
+  DirectLight::Scratch light;
+  std::vector<std::uint8_t> none_is_out;
+  struct Cell {
+    double square = 0;
+    int num = 0;
+  } cell;
+  GatherCounts counts;
+};
+
+LightmapGather::LightmapGather(const Surfaces& surfaces, const Atlas& atlas, const Visibility& shadows, int spacing,
+                               bool keeps_parts, bool keeps_openness)
+    : surfaces_(surfaces),
+      atlas_(atlas),
+      cells_across_((static_cast<std::size_t>(atlas.width()) + LightEstimate::kCell - 1) / LightEstimate::kCell),
+      roles_(surfaces, atlas, shadows, spacing),
+      estimate_(static_cast<std::size_t>(atlas.num_rows()) * atlas.width(),
+                cells_across_ *
+                    ((static_cast<std::size_t>(atlas.num_rows()) + LightEstimate::kCell - 1) / LightEstimate::kCell),
+                keeps_parts, keeps_openness),
+      facts_(estimate_.size()),
+      cell_has_light_(estimate_.num_cells()) {}
+
+int LightmapGather::light_samples_of(const GatherPass& pass, std::size_t texel) const {
+  const int replicates = pass.alone.rows.replicates();
+  return pass.light_levels.empty() ? pass.light_samples : replicates << pass.light_levels[texel];
+}
+
+void LightmapGather::place_sites(const GatherScene& scene, const SobolPoints& points, int x, int y,
+                                 Scratch& scratch) const {
+  const std::uint64_t seed = seed_of(scene.seed, kSitesOfTexel, static_cast<std::uint64_t>(y) * atlas_.width() + x);
+  scratch.receive.sites.clear();
+  for (int r = 0; r < scene.rows.replicates(); ++r) {
+    const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + static_cast<std::uint64_t>(r)));
+    for (int s = 0; s < points.size(); ++s) {
+      const SurfacePoint p = scratch.footprint.sample(points.coordinate(s, 0, seeds), points.coordinate(s, 1, seeds));
+      scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+    }
+  }
+}
+
+bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& scene, const SobolPoints& points, int x,
+                                  int y, Scratch& scratch, NodeLight* node) {
+  atlas_.footprint(x, y, scratch.footprint);
+  if (scratch.footprint.is_empty()) return false;
+  const std::uint64_t id = static_cast<std::uint64_t>(y) * atlas_.width() + x;
+  TexelFacts& facts = facts_[id];
+  facts.coverage = static_cast<float>(scratch.footprint.coverage);
+  facts.area = static_cast<float>(scratch.footprint.area());
+  facts.is_emitter = std::any_of(scratch.footprint.pieces.begin(), scratch.footprint.pieces.end(),
+                                 [&](const FootprintPiece& piece) { return surfaces_.is_emitter[piece.triangle]; });
+  facts.state = TexelState::kBuried;
+
+  place_sites(scene, points, x, y, scratch);
+  const Reception reception =
+      receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive,
+              light_samples_of(pass, id));
+  scratch.counts.num_rays += reception.rays;
+  scratch.counts.num_light_rays += reception.light_rays;
+  ++scratch.counts.num_gathered;
+  if (reception.is_buried) {
+    if (node != nullptr) node->is_buried = true;
+    return false;
+  }
+  facts.state = TexelState::kValid;
+
+  const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
+  Replicates direct, gathered, coarser;
+  for (std::size_t r = 0; r < num_replicates; ++r) {
+    direct[r] = reception.replicates[r].direct;
+    gathered[r] = reception.replicates[r].gathered;
+    coarser[r] = reception.replicates[r].coarser;
+  }
+  const MeanAndVariance sent = mean_and_variance(std::span(direct).first(num_replicates));
+  const MeanAndVariance arrived = mean_and_variance(std::span(gathered).first(num_replicates));
+  add_squares(std::span(gathered).first(num_replicates), arrived.mean, scratch.counts.squares);
+  const Vec3 reflected = reception.mean(scene.rows.replicates()).reflected;
+  estimate_.add(id, {sent.mean, arrived.mean, sent.variance, arrived.variance, reflected, reception.openness},
+                light_samples_of(pass, id));
+  const double coarser_square = mean_square_without_noise(std::span(coarser).first(num_replicates));
+  if (node == nullptr) {
+    scratch.cell.square += coarser_square;
+    ++scratch.cell.num;
+  } else {
+    node->coarser_square = static_cast<float>(coarser_square);
+    for (std::size_t r = 0; r < num_replicates; ++r) {
+      for (int c = 0; c < 3; ++c) node->gathered[r][static_cast<std::size_t>(c)] = static_cast<float>(gathered[r][c]);
+    }
+    for (int c = 0; c < 3; ++c) node->reflected[static_cast<std::size_t>(c)] = static_cast<float>(reflected[c]);
+    node->openness = static_cast<float>(reception.openness);
+    double sum = 0;
+    const auto& hits = scratch.receive.hemisphere.hits;
+    for (const Hit& hit : hits) sum += hit.triangle == kNoHit ? 0 : 1 / std::max(hit.distance, 1e-30f);
+    node->nearest =
+        sum > 0 ? static_cast<float>(static_cast<double>(hits.size()) / sum) : std::numeric_limits<float>::infinity();
+    node->sees_light = reception.visible_share == 1;
+  }
+  return true;
+}
+
+void LightmapGather::gather_nodes(const GatherPass& pass, std::stop_token stop, std::vector<NodeLight>& nodes,
+                                  GatherCounts& counts) {
+  if (roles_.num_nodes() == 0) return;
+  nodes.assign(roles_.num_nodes(), {});
+  const auto rows = roles_.num_nodes() / static_cast<std::size_t>(roles_.nodes_across());
+  const SobolPoints points(pass.nodes.rows.num_sites() / pass.nodes.rows.replicates());
+  std::vector<GatherCounts> of_row(rows);
+  for_each_range(rows, 1, [&](std::size_t begin, std::size_t end) {
+    Scratch scratch;
+    for (std::size_t j = begin; j < end; ++j) {
+      scratch.counts = {};
+      for (int i = 0; i < roles_.nodes_across(); ++i) {
+        if (stop.stop_requested()) return;
+        if (!roles_.is_node(i, static_cast<int>(j))) continue;
+        const int x = i * roles_.spacing(), y = static_cast<int>(j) * roles_.spacing();
+        NodeLight& node = nodes[j * static_cast<std::size_t>(roles_.nodes_across()) + static_cast<std::size_t>(i)];
+        gather_alone(pass, pass.nodes, points, x, y, scratch, &node);
+      }
+      of_row[j] = scratch.counts;
+    }
+  });
+  for (const GatherCounts& row : of_row) counts += row;
+}
+
+void LightmapGather::judge_squares(const std::vector<NodeLight>& nodes) {
+  const int across = roles_.nodes_across();
+  if (across == 0) return;
+  const int down = static_cast<int>(roles_.num_nodes() / static_cast<std::size_t>(across));
+  for (int j = 0; j + 1 < down; ++j) {
+    for (int i = 0; i + 1 < across; ++i) {
+      if (!roles_.is_plain(i, j)) continue;
+      const std::size_t first =
+          static_cast<std::size_t>(j) * static_cast<std::size_t>(across) + static_cast<std::size_t>(i);
+      const auto below = static_cast<std::size_t>(across);
+      double nearest = std::numeric_limits<double>::infinity();
+      bool see_light = true;
+      for (const std::size_t node : {first, first + 1, first + below, first + below + 1}) {
+        nearest = std::min<double>(nearest, nodes[node].nearest);
+        see_light = see_light && nodes[node].sees_light;
+      }
+      // The side of the square, from the texels' area.
+      const std::size_t texel = static_cast<std::size_t>(j * roles_.spacing()) * atlas_.width() + i * roles_.spacing();
+      const double side = roles_.spacing() * std::sqrt(facts_[texel].area);
+      if (!see_light || nearest < kNear * side) roles_.refuse(i, j);
+    }
+  }
+}
+
+double LightmapGather::interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const {
+  // A bilinear patch over squares is off by x (1 - x) f_xx / 2 along x, f_xx being the second difference over the
+  // squares: its mean square is f_xx^2 / 120, and of both directions together at most this.
+  constexpr double kShare = 1.0 / 120 + 1.0 / 144;
+  const auto across = static_cast<std::size_t>(roles_.nodes_across());
+  const auto is_plain = [&](int a, int b) { return a >= 0 && b >= 0 && roles_.is_plain(a, b); };
+  double sum = 0;
+  int num = 0;
+  const auto add = [&](int a, int b, bool along_x) {
+    const std::size_t at = static_cast<std::size_t>(b) * across + static_cast<std::size_t>(a);
+    const std::size_t step = along_x ? 1 : across;
+    Replicates second;
+    for (std::size_t r = 0; r < kMaxReplicates; ++r) {
+      for (int c = 0; c < 3; ++c) {
+        const auto k = static_cast<std::size_t>(c);
+        second[r][c] = nodes[at - step].gathered[r][k] - 2 * nodes[at].gathered[r][k] + nodes[at + step].gathered[r][k];
+      }
+    }
+    sum += mean_square_without_noise(second);
+    ++num;
+  };
+  for (int b = j; b <= j + 1; ++b) {
+    if (is_plain(i - 1, j)) add(i, b, true);
+    if (is_plain(i + 1, j)) add(i + 1, b, true);
+  }
+  for (int a = i; a <= i + 1; ++a) {
+    if (is_plain(i, j - 1)) add(a, j, false);
+    if (is_plain(i, j + 1)) add(a, j + 1, false);
+  }
+  // Both directions: twice the mean of what was found of them.
+  return num > 0 ? 2 * kShare * sum / num : 0;
+}
+
+void LightmapGather::gather_between(const GatherPass& pass, const std::vector<NodeLight>& nodes,
+                                    const TexelRoles::Between& between, int x, int y, Scratch& scratch) {
+  const GatherScene& scene = pass.alone;
+  const std::size_t id = static_cast<std::size_t>(y) * atlas_.width() + x;
+  TexelFacts& facts = facts_[id];
+  const bool has_home = roles_.home(x, y) != TexelRoles::kNoTriangle;
+  const int samples = light_samples_of(pass, id);
+  const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
+  const int num_sites = std::clamp(samples, static_cast<int>(num_replicates), kMostPlainSites);
+
+  // Spread sites over the texel: one jittered grid, since nothing parts them.
+  if (!has_home) atlas_.footprint(x, y, scratch.footprint);
+  const std::uint64_t seed = seed_of(scene.seed, kSitesOfTexel, id);
+  scratch.receive.sites.clear();
+  for (int s = 0; s < num_sites; ++s) {
+    const std::uint64_t bits = mixed_bits(seed + static_cast<std::uint64_t>(s));
+    const double u = static_cast<double>(bits >> 32) * 0x1p-32, v = static_cast<double>(bits & 0xffffffffu) * 0x1p-32;
+    const SurfacePoint p = has_home ? roles_.point_at_home(x, y, u, v) : scratch.footprint.sample(u, v);
+    scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+  }
+  if (facts.state == TexelState::kOutside) {
+    const std::uint32_t t = scratch.receive.sites[0].point.triangle;
+    facts.coverage = 1;
+    facts.is_emitter = surfaces_.is_emitter[t] != 0;
+    const double texel_area = has_home ? std::fabs(twice_area(atlas_.layout().corners[t])) / 2 : 0;
+    facts.area = static_cast<float>(has_home ? surfaces_.areas[t] / texel_area : scratch.footprint.area());
+    facts.state = TexelState::kValid;
+  }
+
+  Replicates direct;
+  scratch.none_is_out.assign(scratch.receive.sites.size(), 0);
+  scratch.counts.num_light_rays +=
+      scene.direct.estimate(scratch.receive.sites, scratch.none_is_out, seed_of(scene.seed, kLightOfTexel, id),
+                            scratch.light, std::span(direct).first(num_replicates), samples);
+  Replicates gathered{};
+  Vec3 reflected;
+  double openness = 0;
+  for (std::size_t k = 0; k < between.nodes.size(); ++k) {
+    const NodeLight& node = nodes[between.nodes[k]];
+    const double weight = between.weights[k];
+    for (std::size_t r = 0; r < num_replicates; ++r) {
+      gathered[r] += Vec3{node.gathered[r][0], node.gathered[r][1], node.gathered[r][2]} * weight;
+    }
+    reflected += Vec3{node.reflected[0], node.reflected[1], node.reflected[2]} * weight;
+    openness += node.openness * weight;
+  }
+  const MeanAndVariance sent = mean_and_variance(std::span(direct).first(num_replicates));
+  const MeanAndVariance arrived = mean_and_variance(std::span(gathered).first(num_replicates));
+  add_squares(std::span(gathered).first(num_replicates), arrived.mean, scratch.counts.squares);
+  estimate_.add(id, {sent.mean, arrived.mean, sent.variance, arrived.variance, reflected, openness}, samples);
+}
+
+bool LightmapGather::add_pass(const GatherPass& pass, const std::function<void(const GatheredTile&)>& on_tile,
+                              std::stop_token stop, std::stop_token finish, GatherCounts& counts) {
+  const int width = atlas_.width(), height = atlas_.height();
   const int edge = std::max(width, height) > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
   const int tiles_across = (width + edge - 1) / edge, tiles_down = (height + edge - 1) / edge;
-  const std::size_t num_texels = static_cast<std::size_t>(atlas.num_rows()) * width;
-  const SobolPoints site_points(scene.rows.num_sites() / scene.rows.replicates());
+  const SobolPoints points(pass.alone.rows.num_sites() / pass.alone.rows.replicates());
 
-  GatheredMap map;
-  map.rgba.assign(num_texels * 4, 0.0f);
-  if (layers.direct) map.direct.assign(num_texels * 4, 0.0f);
-  if (layers.indirect) map.indirect.assign(num_texels * 4, 0.0f);
-  if (layers.openness) map.openness.assign(num_texels * 4, 0.0f);
-  map.states.assign(num_texels, TexelState::kOutside);
-  struct TileSums {
-    std::uint64_t rays = 0, light_rays = 0;
-    double flux = 0, area = 0;
-  };
-  std::vector<TileSums> sums(static_cast<std::size_t>(tiles_across) * tiles_down * atlas.num_sheets());
+  estimate_.begin_pass(pass.weight);
+  std::vector<NodeLight> nodes;
+  gather_nodes(pass, stop, nodes, counts);
+  if (stop.stop_requested()) return false;
+  judge_squares(nodes);
+
+  const auto num_tiles = static_cast<std::size_t>(tiles_across) * tiles_down * atlas_.num_sheets();
+  std::vector<GatherCounts> of_tile(num_tiles);
+  std::vector<std::uint8_t> is_left_out(num_tiles, 0);
   std::mutex report_mutex;
   std::uint64_t texels_done = 0;
-
-  const auto gather_tile = [&](int index) {
-    Scratch scratch;
+  const auto gather_tile = [&](std::size_t index, Scratch& scratch) {
     GatheredTile tile;
-    tile.sheet = index / (tiles_across * tiles_down);
-    tile.x = index % tiles_across * edge;
-    tile.y = index / tiles_across % tiles_down * edge;
+    const auto at = static_cast<int>(index);
+    tile.sheet = at / (tiles_across * tiles_down);
+    tile.x = at % tiles_across * edge;
+    tile.y = at / tiles_across % tiles_down * edge;
     tile.width = std::min(edge, width - tile.x);
     tile.height = std::min(edge, height - tile.y);
     const int first_row = tile.sheet * height + tile.y;
-    TileSums& own = sums[index];
+    scratch.counts = {};
     std::uint64_t texels = 0;
+    // Cell by cell, as each keeps sums of its own.
+    constexpr int kCell = LightEstimate::kCell;
+    for (int cy = first_row; cy < first_row + tile.height; cy += kCell) {
+      for (int cx = tile.x; cx < tile.x + tile.width; cx += kCell) {
+        scratch.cell = {};
+        double interpolated = 0;
+        bool has_light = false;
+        for (int y = cy; y < std::min(cy + kCell, first_row + tile.height); ++y) {
+          for (int x = cx; x < std::min(cx + kCell, tile.x + tile.width); ++x) {
+            if (stop.stop_requested()) return;
+            const std::size_t id = static_cast<std::size_t>(y) * width + x;
+            const int spacing = roles_.spacing();
+            if (spacing > 1 && x % spacing == 0 && y % spacing == 0 && roles_.is_node(x / spacing, y / spacing)) {
+              // Done already, but for its cell.
+              const int i = x / spacing, j = y / spacing;
+              const NodeLight& node =
+                  nodes[static_cast<std::size_t>(j) * static_cast<std::size_t>(roles_.nodes_across()) +
+                        static_cast<std::size_t>(i)];
+              if (facts_[id].state == TexelState::kValid) {
+                scratch.cell.square += node.coarser_square;
+                ++scratch.cell.num;
+              }
+              if (roles_.is_plain(i, j)) interpolated = interpolation_square(nodes, i, j);
+            } else if (const auto between = roles_.between(x, y)) {
+              gather_between(pass, nodes, *between, x, y, scratch);
+            } else {
+              gather_alone(pass, pass.alone, points, x, y, scratch, nullptr);
+            }
+            texels += facts_[id].state != TexelState::kOutside;
+            has_light |= facts_[id].state == TexelState::kValid;
+          }
+        }
+        const double patch_square = scratch.cell.num > 0 ? scratch.cell.square / scratch.cell.num : 0;
+        const std::size_t cell = cell_of(static_cast<std::size_t>(cy) * width + cx);
+        estimate_.add_to_cell(cell, patch_square, interpolated);
+        cell_has_light_[cell] = has_light;
+      }
+    }
+    of_tile[index] = scratch.counts;
+    if (!on_tile) return;
+    tile.rgba.reserve(static_cast<std::size_t>(tile.width) * tile.height * 4);
     for (int y = first_row; y < first_row + tile.height; ++y) {
       for (int x = tile.x; x < tile.x + tile.width; ++x) {
-        if (stop.stop_requested()) return;
-        const Texel texel = gather_texel(scene, atlas, site_points, x, y, scratch);
-        const std::size_t at = static_cast<std::size_t>(y) * width + x;
-        map.states[at] = texel.state;
-        put(texel.irradiance, texel.coverage, at, map.rgba);
-        // What is not indirect: rounding must not make it negative.
-        const Vec3 direct = texel.irradiance - texel.indirect;
-        put({std::max(direct.x, 0.0), std::max(direct.y, 0.0), std::max(direct.z, 0.0)}, texel.coverage, at,
-            map.direct);
-        put(texel.indirect, texel.coverage, at, map.indirect);
-        put(Vec3{1, 1, 1} * texel.openness, texel.coverage, at, map.openness);
-        own.rays += texel.rays;
-        own.light_rays += texel.light_rays;
-        texels += texel.state != TexelState::kOutside;
-        if (texel.state == TexelState::kValid) {
-          own.area += texel.area;
-          own.flux += texel.area * mean_component(texel.irradiance);
-        }
+        const std::size_t id = static_cast<std::size_t>(y) * width + x;
+        const Vec3 irradiance = estimate_.irradiance(id);
+        for (int c = 0; c < 3; ++c) tile.rgba.push_back(static_cast<float>(irradiance[c]));
+        tile.rgba.push_back(facts_[id].coverage);
       }
-      tile.rgba.insert(tile.rgba.end(), map.rgba.begin() + 4 * (static_cast<std::ptrdiff_t>(y) * width + tile.x),
-                       map.rgba.begin() + 4 * (static_cast<std::ptrdiff_t>(y) * width + tile.x + tile.width));
     }
     const std::scoped_lock lock(report_mutex);
     texels_done += texels;
     tile.texels_done = texels_done;
-    if (on_tile) on_tile(tile);
+    on_tile(tile);
   };
-  for_each_range(sums.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t index = begin; index < end; ++index) gather_tile(static_cast<int>(index));
+  for_each_range(num_tiles, 1, [&](std::size_t begin, std::size_t end) {
+    Scratch scratch;
+    for (std::size_t index = begin; index < end; ++index) {
+      is_left_out[index] = finish.stop_requested();
+      if (!is_left_out[index]) gather_tile(index, scratch);
+    }
   });
+  for (const GatherCounts& tile : of_tile) counts += tile;
+  if (stop.stop_requested()) return false;
+  estimate_.end_pass();
+  note_spread(pass.weight, counts.squares, pass.alone.rows.replicates());
+  return std::find(is_left_out.begin(), is_left_out.end(), 1) == is_left_out.end();
+}
 
-  double flux = 0, area = 0;
-  for (const TileSums& tile : sums) {
-    map.num_rays += tile.rays;
-    map.num_light_rays += tile.light_rays;
-    flux += tile.flux;
-    area += tile.area;
+GatherCounts& GatherCounts::operator+=(const GatherCounts& other) {
+  num_rays += other.num_rays;
+  num_light_rays += other.num_light_rays;
+  num_gathered += other.num_gathered;
+  for (std::size_t r = 0; r < squares.size(); ++r) squares[r] += other.squares[r];
+  return *this;
+}
+
+void LightmapGather::note_spread(double weight, const std::array<double, kMaxReplicates>& squares, int replicates) {
+  double mean = 0, variance = 0;
+  for (int r = 0; r < replicates; ++r) mean += squares[static_cast<std::size_t>(r)] / replicates;
+  for (int r = 0; r < replicates; ++r) {
+    const double off = squares[static_cast<std::size_t>(r)] - mean;
+    variance += replicates > 1 ? off * off / (replicates - 1) : 0;
   }
-  map.mean_irradiance = area > 0 ? flux / area : 0;
-  map.is_cancelled = stop.stop_requested();
-  return map;
+  // The squares of a weighted mean's parts add up, and so do their variances.
+  const double share = weight / (total_weight_ += weight), part = share * share, rest = (1 - share) * (1 - share);
+  spread_mean_ = rest * spread_mean_ + part * mean;
+  spread_deviation_ = std::hypot(rest * spread_deviation_, part * std::sqrt(variance));
+}
+
+double LightmapGather::mean_irradiance() const {
+  double flux = 0, area = 0;
+  for (std::size_t i = 0; i < facts_.size(); ++i) {
+    if (facts_[i].state != TexelState::kValid) continue;
+    area += facts_[i].area;
+    flux += facts_[i].area * mean_component(estimate_.irradiance(i));
+  }
+  return area > 0 ? flux / area : 0;
 }
 
 }  // namespace radbake::radiosity

@@ -1,12 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
-#include <span>
 #include <stop_token>
 #include <vector>
 
+#include "server/radiosity/gather/light_estimate.h"
 #include "server/radiosity/gather/receive.h"
+#include "server/radiosity/gather/texel_roles.h"
 #include "server/radiosity/lightmap/atlas.h"
 #include "server/radiosity/lightmap/fill.h"
 
@@ -17,29 +19,93 @@ struct GatheredTile {
   int sheet = 0;
   int x = 0, y = 0, width = 0, height = 0;
   std::vector<float> rgba;
-  std::uint64_t texels_done = 0;  ///< with coverage, so far in the whole gather
+  std::uint64_t texels_done = 0;  ///< with coverage, so far in the whole pass
 };
 
-/// Gathered lightmaps, sheets stacked, before they are filled.
-struct GatheredMap {
-  std::vector<float> rgba;  ///< [num_rows * width * 4] irradiance, lx, and coverage
-  // The same shape, where they are asked for: lx, lx, and openness in each channel.
-  std::vector<float> direct, indirect, openness;
-  std::vector<TexelState> states;  ///< [num_rows * width]
-  std::uint64_t num_rays = 0;
-  std::uint64_t num_light_rays = 0;
-  double mean_irradiance = 0;  ///< of valid texels, weighted by area, mean of the channels, lx
-  bool is_cancelled = false;
+/// What a texel is to its lightmap.
+struct TexelFacts {
+  TexelState state = TexelState::kOutside;
+  bool is_emitter = false;
+  float coverage = 0;
+  float area = 0;  ///< of its footprint, scene units squared
 };
 
-/// Parts of the light that are kept beside all of it.
-struct GatherLayers {
-  bool direct = false, indirect = false, openness = false;
+/// One pass of the final gather.
+struct GatherPass {
+  /// For texels that gather alone, and for nodes: the same but for the rays of their rows.
+  const GatherScene& alone;
+  const GatherScene& nodes;
+  int light_samples = 0;  ///< shadow rays to emitters of all replicates, a texel
+  std::span<const std::uint8_t> light_levels =
+      {};             ///< [texels] log2 of the own samples of each replicate; empty: all alike
+  double weight = 1;  ///< of this pass's gathered light
 };
 
-/// Final gather: receive() over the footprint of each texel. A buried texel is invalid. Tiles are reported as they
-/// finish, one call at a time, in any order; the map does not depend on that order.
-GatheredMap gather_lightmap(const GatherScene& scene, const Atlas& atlas, GatherLayers layers,
-                            const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop);
+/// What a pass took.
+struct GatherCounts {
+  std::uint64_t num_rays = 0, num_light_rays = 0;
+  std::uint64_t num_gathered = 0;                ///< texels that gathered by themselves
+  std::array<double, kMaxReplicates> squares{};  ///< of each replicate's distance from their mean, summed over texels
+
+  GatherCounts& operator+=(const GatherCounts& other);
+};
+
+/// Lightmaps in the making, sheets stacked.
+class LightmapGather {
+ public:
+  /// keeps_parts: what surfaces reflect; keeps_openness: ambient occlusion.
+  LightmapGather(const Surfaces& surfaces, const Atlas& atlas, const Visibility& shadows, int spacing, bool keeps_parts,
+                 bool keeps_openness);
+
+  /// Final gather of one pass: receive() over the footprint of each texel, or, of plain squares, over the footprints of
+  /// their nodes and direct light everywhere. A buried texel is invalid. Tiles are reported as they finish, one call at
+  /// a time, in any order; the map does not depend on that order. Stopped, the estimate means nothing; asked to finish,
+  /// tiles that were not begun keep what earlier passes found: false then.
+  bool add_pass(const GatherPass& pass, const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop,
+                std::stop_token finish, GatherCounts& counts);
+
+  const Atlas& atlas() const { return atlas_; }
+  const LightEstimate& estimate() const { return estimate_; }
+  const std::vector<TexelFacts>& facts() const { return facts_; }
+  std::size_t cell_of(std::size_t texel) const {
+    const std::size_t x = texel % static_cast<std::size_t>(atlas_.width()),
+                      y = texel / static_cast<std::size_t>(atlas_.width());
+    return y / LightEstimate::kCell * cells_across_ + x / LightEstimate::kCell;
+  }
+  std::size_t cells_across() const { return cells_across_; }
+  /// Whether any texel of a cell is valid.
+  bool has_light(std::size_t cell) const { return cell_has_light_[cell] != 0; }
+  /// Of valid texels, weighted by area, mean of the channels, lx.
+  double mean_irradiance() const;
+  /// Standard deviation over mean of the replicates' mean square distances from their mean, of gathered light: how much
+  /// such a square varies from one bake to the next.
+  double relative_spread() const { return spread_mean_ > 0 ? spread_deviation_ / spread_mean_ : 0; }
+
+ private:
+  /// What the nodes of one pass found.
+  struct NodeLight;
+  struct Scratch;
+
+  void gather_nodes(const GatherPass& pass, std::stop_token stop, std::vector<NodeLight>& nodes, GatherCounts& counts);
+  void judge_squares(const std::vector<NodeLight>& nodes);
+  double interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const;
+  void place_sites(const GatherScene& scene, const SobolPoints& points, int x, int y, Scratch& scratch) const;
+  /// The texel by itself: false where it covers nothing or is buried.
+  bool gather_alone(const GatherPass& pass, const GatherScene& scene, const SobolPoints& points, int x, int y,
+                    Scratch& scratch, NodeLight* node);
+  void gather_between(const GatherPass& pass, const std::vector<NodeLight>& nodes, const TexelRoles::Between& between,
+                      int x, int y, Scratch& scratch);
+  void note_spread(double weight, const std::array<double, kMaxReplicates>& squares, int replicates);
+  int light_samples_of(const GatherPass& pass, std::size_t texel) const;
+
+  const Surfaces& surfaces_;
+  const Atlas& atlas_;
+  std::size_t cells_across_;
+  TexelRoles roles_;
+  LightEstimate estimate_;
+  std::vector<TexelFacts> facts_;             ///< [texels]
+  std::vector<std::uint8_t> cell_has_light_;  ///< [cells]
+  double total_weight_ = 0, spread_mean_ = 0, spread_deviation_ = 0;
+};
 
 }  // namespace radbake::radiosity

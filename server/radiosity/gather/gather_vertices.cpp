@@ -1,6 +1,7 @@
 #include "server/radiosity/gather/gather_vertices.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 
 #include "server/radiosity/threads/for_each_range.h"
@@ -71,56 +72,76 @@ std::uint64_t fill_buried(const VertexGroups& groups, std::vector<std::uint8_t>&
 
 }  // namespace
 
-GatheredVertices gather_vertices(const GatherScene& scene, const VertexGroups& groups,
-                                 const std::function<void(std::uint64_t)>& on_done, std::stop_token stop) {
-  GatheredVertices out;
-  out.irradiance.resize(groups.size());
-  std::vector<std::uint8_t> is_known(groups.size(), 0);
+VertexGather::VertexGather(const Surfaces& surfaces, const VertexGroups& groups)
+    : surfaces_(surfaces),
+      groups_(groups),
+      estimate_(groups.size(), groups.size(), false, false),
+      is_known_(groups.size(), 0) {}
+
+void VertexGather::add_pass(const GatherScene& scene, int light_samples, double weight,
+                            const std::function<void(std::uint64_t)>& on_done, std::stop_token stop,
+                            GatherCounts& counts) {
+  const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
   const SobolPoints site_points(scene.rows.num_sites() / scene.rows.replicates());
   std::atomic<std::uint64_t> num_done = 0, num_rays = 0, num_light_rays = 0;
-  for_each_range(groups.size(), kGroupsPerTask, [&](std::size_t begin, std::size_t end) {
+  estimate_.begin_pass(weight);
+  for_each_range(groups_.size(), kGroupsPerTask, [&](std::size_t begin, std::size_t end) {
     Scratch scratch;
     for (std::size_t k = begin; k < end; ++k) {
       if (stop.stop_requested()) return;
       const auto g = static_cast<std::uint32_t>(k);
       double area = 0;
       scratch.area_up_to.clear();
-      for (std::uint32_t c = groups.first_corner[g]; c < groups.first_corner[g + 1]; ++c) {
-        area += scene.surfaces.areas[groups.corners[c] / 3];
+      for (std::uint32_t c = groups_.first_corner[g]; c < groups_.first_corner[g + 1]; ++c) {
+        area += surfaces_.areas[groups_.corners[c] / 3];
         scratch.area_up_to.push_back(area);
       }
       scratch.receive.sites.clear();
-      for (int r = 0; r < scene.rows.replicates(); ++r) {
-        const auto seeds =
-            SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfVertex, g) + static_cast<std::uint64_t>(r)));
+      for (std::size_t r = 0; r < num_replicates; ++r) {
+        const auto seeds = SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfVertex, g) + r));
         for (int s = 0; s < site_points.size(); ++s) {
-          const SurfacePoint p = sample_near(groups, g, scratch.area_up_to, site_points.coordinate(s, 0, seeds),
+          const SurfacePoint p = sample_near(groups_, g, scratch.area_up_to, site_points.coordinate(s, 0, seeds),
                                              site_points.coordinate(s, 1, seeds));
-          scratch.receive.sites.push_back(front_site(scene.surfaces, p, scene.surfaces.shading_normal(p)));
+          scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
         }
       }
       const Reception reception = receive(scene, seed_of(scene.seed, kRaysOfVertex, g),
-                                          seed_of(scene.seed, kLightOfVertex, g), scratch.receive);
-      out.irradiance[g] = reception.mean(scene.rows.replicates()).irradiance();
-      is_known[g] = !reception.is_buried;
+                                          seed_of(scene.seed, kLightOfVertex, g), scratch.receive, light_samples);
       num_rays += reception.rays;
       num_light_rays += reception.light_rays;
+      is_known_[g] = !reception.is_buried;
+      if (reception.is_buried) continue;
+      std::array<Vec3, kMaxReplicates> direct, gathered, coarser;
+      for (std::size_t r = 0; r < num_replicates; ++r) {
+        direct[r] = reception.replicates[r].direct;
+        gathered[r] = reception.replicates[r].gathered;
+        coarser[r] = reception.replicates[r].coarser;
+      }
+      const MeanAndVariance sent = mean_and_variance(std::span(direct).first(num_replicates));
+      const MeanAndVariance arrived = mean_and_variance(std::span(gathered).first(num_replicates));
+      estimate_.add(g, {sent.mean, arrived.mean, sent.variance, arrived.variance, {}, 0}, light_samples);
+      estimate_.add_to_cell(g, mean_square_without_noise(std::span(coarser).first(num_replicates)), 0);
     }
     num_done += end - begin;
     if (on_done) on_done(num_done);
   });
-  out.is_cancelled = stop.stop_requested();
-  if (out.is_cancelled) return out;
-  out.num_rays = num_rays;
-  out.num_light_rays = num_light_rays;
-  out.num_filled = fill_buried(groups, is_known, out.irradiance);
+  estimate_.end_pass();
+  counts.num_rays += num_rays;
+  counts.num_light_rays += num_light_rays;
+  counts.num_gathered += groups_.size();
+}
 
+GatheredVertices finish_vertices(const Surfaces& surfaces, const VertexGroups& groups, const VertexGather& gather) {
+  GatheredVertices out;
+  for (std::size_t g = 0; g < groups.size(); ++g) out.irradiance.push_back(gather.estimate().irradiance(g));
+  std::vector<std::uint8_t> is_known = gather.is_known();
+  out.num_filled = fill_buried(groups, is_known, out.irradiance);
   double flux = 0, area = 0;
   for (std::size_t t = 0; t < groups.of_corner.size(); ++t) {
     for (const std::uint32_t g : groups.of_corner[t]) {
-      flux += scene.surfaces.areas[t] * mean_component(out.irradiance[g]) / 3;
+      flux += surfaces.areas[t] * mean_component(out.irradiance[g]) / 3;
     }
-    area += scene.surfaces.areas[t];
+    area += surfaces.areas[t];
   }
   out.mean_irradiance = area > 0 ? flux / area : 0;
   return out;

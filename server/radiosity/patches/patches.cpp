@@ -120,6 +120,42 @@ std::uint32_t Patches::part_at(std::uint32_t cell, Vec3 grid) const {
   return best;
 }
 
+std::vector<std::uint32_t> Patches::twice_as_large() const {
+  std::vector<std::uint32_t> larger(size());
+  for (std::uint32_t patch = 0; patch < size(); ++patch) larger[patch] = patch;
+  // The first front of each larger cell stands for it.
+  std::unordered_map<SparseCell, std::uint32_t, SparseCellHash> first;
+  const auto join = [&](std::uint32_t group, std::uint64_t flat, std::uint32_t cell, bool can_take) {
+    const Grid& grid = grids_[group];
+    if (first_part_[cell + 1] - first_part_[cell] != 1) return;
+    const auto across = static_cast<std::uint64_t>(grid.cells[0]), down = static_cast<std::uint64_t>(grid.cells[1]);
+    const std::uint64_t x = flat % across / 2, y = flat / across % down / 2, z = flat / across / down / 2;
+    const auto [entry, is_new] = first.try_emplace({group, (z * (down / 2 + 1) + y) * (across / 2 + 1) + x}, kNoPatch);
+    if (!can_take) {
+      entry->second = std::min(entry->second, first_part_[cell]);
+    } else {
+      larger[first_part_[cell]] = entry->second;
+    }
+  };
+  for (const bool can_take : {false, true}) {
+    for (std::uint32_t group = 0; group < grids_.size(); ++group) {
+      const Grid& grid = grids_[group];
+      if (!grid.is_dense) continue;
+      const std::uint64_t num_cells = static_cast<std::uint64_t>(grid.cells[0]) * grid.cells[1] * grid.cells[2];
+      for (std::uint64_t flat = 0; flat < num_cells; ++flat) {
+        const std::uint32_t cell = dense_[grid.dense_at + flat];
+        if (cell != kNoPatch) join(group, flat, cell, can_take);
+      }
+    }
+    for (const auto& [at, cell] : sparse_) join(at.group, at.flat, cell, can_take);
+  }
+  for (auto patch = static_cast<std::uint32_t>(num_cells()); patch < size(); ++patch) {
+    const std::uint32_t back = back_of_cell_[larger[front_of(patch)]];
+    if (back != kNoPatch) larger[patch] = back;
+  }
+  return larger;
+}
+
 SurfacePoint Patches::sample(std::uint32_t patch, double x, double y) const {
   const std::uint32_t cell = is_back(patch) ? cell_of_back_[patch - num_cells()] : patch;
   // Choose a piece by area, and use what is left of x within it.

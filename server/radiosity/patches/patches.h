@@ -82,6 +82,10 @@ class Patches {
   /// A point of the patch, uniform by area for uniform (x, y) in the unit square; continuous within a piece.
   SurfacePoint sample(std::uint32_t patch, double x, double y) const;
 
+  /// For each patch, one that stands for the patch twice as large that it is a part of: 2 x 2 cells of its grid (2 x 2
+  /// x 2 where it is curved), on the same side. Parts of a cell that a contact cuts stay apart. Shapes: [size()].
+  std::vector<std::uint32_t> twice_as_large() const;
+
   /// The direction that a point of this patch faces: the triangle's normal, turned for back patches.
   Vec3 normal(std::uint32_t patch, const SurfacePoint& p, const Surfaces& surfaces) const {
     return is_back(patch) ? -surfaces.normals[p.triangle] : surfaces.normals[p.triangle];

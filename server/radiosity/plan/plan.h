@@ -9,6 +9,7 @@
 #include "common/scene/scene.h"
 #include "server/radiosity/lightmap/layout.h"
 #include "server/radiosity/plan/effect_plan.h"
+#include "server/radiosity/plan/pass_plan.h"
 #include "server/radiosity/plan/prediction.h"
 #include "server/radiosity/plan/transport_choice.h"
 #include "server/radiosity/solve/solve.h"
@@ -69,6 +70,8 @@ struct BakePlan {
   int rays_per_texel = 0;
   int rays_per_row = 0;
   int light_samples_per_texel = 0;
+  PassSettings first_pass = {};  ///< the only one where neither an error nor a time is asked
+  int spacing = 1;               ///< texels from one that gathers indirect light to the next, where surfaces are plain
   FormFactors form_factors = FormFactors::kHemisphere;  ///< never kAuto
   Transport transport = Transport::kSparse;             ///< never kAuto
   Solver solver = Solver::kGaussSeidel;
@@ -97,6 +100,8 @@ inline constexpr std::uint64_t kDefaultTransportMemory = std::uint64_t{4} << 30;
 /// Shadow rays to emitters, a texel and a patch. A patch's estimate is averaged over many patches by every texel.
 inline constexpr int kLightSamplesPerTexel = 128;
 inline constexpr int kLightSamplesPerPatch = 64;
+/// Texels from one that gathers indirect light to the next, where a bake is asked by error or by time.
+inline constexpr int kProgressiveSpacing = 4;
 
 /// Errors: kInvalidArgument naming the option and the value. Zero is always right: it means choose.
 Result<void> check_options(const BakeOptions& options);

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/radiosity/gather/receive.h"
+
+namespace radbake::radiosity {
+
+/// Light at one receiver as one pass found it, lx: means of the replicates and the variances of those means.
+struct PassLight {
+  Vec3 direct, gathered;
+  Vec3 direct_variance, gathered_variance;
+  Vec3 reflected;  ///< of `gathered` what surfaces reflect
+  double openness = 0;
+};
+
+/// Mean of independent estimates, and the variance of that mean: sum (x_r - mean)^2 / (k (k - 1)).
+struct MeanAndVariance {
+  Vec3 mean, variance;
+};
+MeanAndVariance mean_and_variance(std::span<const Vec3> replicates);
+
+/// Mean of the products of different replicates, averaged over the channels: an estimate of the square of what they
+/// estimate, without the square of their noise. May be negative.
+double mean_square_without_noise(std::span<const Vec3> replicates);
+
+/// The light of many receivers (texels of stacked sheets, groups of vertices) as the weighted mean of passes.
+///
+///   mean = sum w_p x_p / sum w_p        variance = sum w_p^2 v_p / (sum w_p)^2
+///
+/// Passes are independent of each other. Direct light has weights of its own, by receiver: its number of shadow rays.
+/// What is discrete about the estimate is kept by cell: a square of kCell texels a side, or one group of vertices.
+/// Memory: 7 floats a receiver for variances and weights, 6 for the light itself.
+class LightEstimate {
+ public:
+  /// Side of a cell, texels.
+  static constexpr int kCell = 4;
+
+  LightEstimate(std::size_t num_receivers, std::size_t num_cells, bool has_reflected, bool has_openness);
+
+  std::size_t size() const { return direct_weight_.size(); }
+  std::size_t num_cells() const { return patch_square_.size(); }
+
+  /// Every receiver is added once a pass, or never where it has no light. `gathered_weight`: of this pass.
+  void begin_pass(double gathered_weight) { pass_weight_ = gathered_weight; }
+  void add(std::size_t receiver, const PassLight& light, double direct_weight);
+  void end_pass() { gathered_weight_ += pass_weight_; }
+
+  Vec3 direct(std::size_t i) const { return at(direct_, i); }
+  Vec3 gathered(std::size_t i) const { return at(gathered_, i); }
+  Vec3 irradiance(std::size_t i) const { return direct(i) + gathered(i); }
+  Vec3 reflected(std::size_t i) const { return at(reflected_, i); }
+  double openness(std::size_t i) const { return openness_[i]; }
+  Vec3 direct_variance(std::size_t i) const { return at(direct_variance_, i); }
+  Vec3 gathered_variance(std::size_t i) const { return at(gathered_variance_, i); }
+  double direct_weight(std::size_t i) const { return direct_weight_[i]; }
+
+  /// Squares of what a cell is off by, estimated by one pass, mean of the channels, lx^2: by patches twice as large in
+  /// the place of its own, and by interpolation. May be negative.
+  void add_to_cell(std::size_t cell, double patch_square, double interpolation_square);
+  double patch_square(std::size_t cell) const { return patch_square_[cell]; }
+  double interpolation_square(std::size_t cell) const { return interpolation_square_[cell]; }
+
+ private:
+  static Vec3 at(const std::vector<float>& values, std::size_t i) {
+    return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+  }
+
+  double gathered_weight_ = 0, pass_weight_ = 0;
+  std::vector<float> direct_, gathered_, reflected_;        // [size() * 3]; the last one may be empty
+  std::vector<float> openness_;                             // [size()], may be empty
+  std::vector<float> direct_variance_, gathered_variance_;  // [size() * 3]
+  std::vector<float> direct_weight_;                        // [size()]
+  std::vector<float> patch_square_, interpolation_square_;  // [num_cells()]
+};
+
+}  // namespace radbake::radiosity

@@ -1,0 +1,121 @@
+#include "server/radiosity/plan/pass_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace radbake::radiosity {
+namespace {
+
+/// The pass of scale 1.
+constexpr double kRaysPerRow = 32, kPatchLightSamples = 16, kRaysPerTexel = 32, kRaysPerNode = 128, kLightSamples = 16;
+constexpr double kMostRays = 65536;
+constexpr double kReplicates = 4;
+
+constexpr double kAim = 0.8, kDone = 0.9;
+/// A ray that finds the nearest surface and the patch there takes this many shadow rays' time.
+constexpr double kRayCost = 2;
+/// Passes add at most this many times what was spent, so that the map improves as one looks on.
+constexpr double kGrowthToTarget = 3, kGrowthInBudget = 1;
+constexpr int kMostPasses = 64;
+/// Of the time left, what a pass may be predicted to take.
+constexpr double kSafeShare = 0.9;
+/// A pass that adds less than this share to what was spent is not worth its fixed costs.
+constexpr double kLeastGrowth = 0.1;
+
+int whole(double wanted, double least, double multiple) {
+  const double rounded = std::round(std::clamp(wanted, least, kMostRays) / multiple) * multiple;
+  return static_cast<int>(rounded);
+}
+
+}  // namespace
+
+PassSettings pass_of(double gathered_scale, double direct_scale) {
+  // Each replicate of a row has enough rays to tell what is buried.
+  constexpr double kLeastRays = 8 * kReplicates;
+  PassSettings pass;
+  pass.rays_per_row = whole(kRaysPerRow * gathered_scale, kLeastRays, kReplicates);
+  pass.patch_light_samples = whole(kPatchLightSamples * gathered_scale, 4 * kReplicates, 4 * kReplicates);
+  pass.rays_per_texel = whole(kRaysPerTexel * gathered_scale, kLeastRays, kReplicates);
+  pass.rays_per_node = whole(kRaysPerNode * gathered_scale, kLeastRays, kReplicates);
+  pass.light_samples = whole(kLightSamples * direct_scale, kReplicates, kReplicates);
+  pass.gathered_weight = gathered_scale;
+  return pass;
+}
+
+std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass) {
+  const auto squared = [](double x) { return x * x; };
+  const bool has_budget = results.seconds_left >= 0;
+  no_pass.limited_by.clear();
+  if (max_error > 0 && results.error <= kDone * max_error) return std::nullopt;
+  const double fixed = squared(results.discretisation) + squared(results.algebraic);
+  const double direct = squared(results.direct_sampling), gathered = squared(results.gathered_sampling);
+  if (results.num_passes >= kMostPasses || direct + gathered == 0) {
+    no_pass.limited_by = direct + gathered == 0 ? "discretisation" : "passes";
+    return std::nullopt;
+  }
+
+  // What sampling may leave. Where the other parts take all, it is brought well below them.
+  double allowed = 0;
+  if (max_error > 0) {
+    allowed = squared(kAim * max_error) - fixed;
+    const double floor = fixed / 16;
+    if (allowed < floor) {
+      if (direct + gathered <= 2 * floor) {
+        no_pass.limited_by = "discretisation";
+        return std::nullopt;
+      }
+      allowed = floor;
+    }
+  } else {
+    allowed = (direct + gathered) / 4;  // halved by each pass, as long as there is time
+  }
+
+  // Efforts with the least cost.
+  const double direct_cost = results.direct_rays / results.direct_effort;
+  const double gathered_cost = kRayCost * results.gathered_rays / results.gathered_effort;
+  const double direct_part = direct * results.direct_effort, gathered_part = gathered * results.gathered_effort;
+  const double root = std::sqrt(direct_part * direct_cost) + std::sqrt(gathered_part * gathered_cost);
+  double direct_effort = direct_cost > 0 ? std::sqrt(direct_part / direct_cost) * root / allowed : 0;
+  double gathered_effort = gathered_cost > 0 ? std::sqrt(gathered_part / gathered_cost) * root / allowed : 0;
+  // Where one part has more than it needs, the other reaches the target alone.
+  if (direct_effort < results.direct_effort && allowed > direct) {
+    direct_effort = results.direct_effort;
+    gathered_effort = gathered_part / (allowed - direct);
+  } else if (gathered_effort < results.gathered_effort && allowed > gathered) {
+    gathered_effort = results.gathered_effort;
+    direct_effort = direct_part / (allowed - gathered);
+  }
+  const double direct_rest = std::max(0.0, direct_effort - results.direct_effort);
+  const double gathered_rest = std::max(0.0, gathered_effort - results.gathered_effort);
+  const double rest = direct_rest * direct_cost + gathered_rest * gathered_cost;
+
+  // This pass's share of it.
+  const double spent = results.direct_effort * direct_cost + results.gathered_effort * gathered_cost;
+  const double growth = has_budget ? kGrowthInBudget : kGrowthToTarget;
+  double share = std::min(1.0, growth * spent / std::max(rest, 1e-300));
+  double seconds_share = 1;
+  if (has_budget) {
+    const double last_cost = results.last_direct_scale * direct_cost + results.last_gathered_scale * gathered_cost;
+    const double seconds = results.last_seconds * share * rest / std::max(last_cost, 1e-300);
+    const double most = kSafeShare * results.seconds_left;
+    if (seconds > most) share *= most / seconds;
+    // A last pass takes the rest where another of its size would not fit.
+    if (share * rest < kLeastGrowth * spent) {
+      no_pass.limited_by = "time";
+      return std::nullopt;
+    }
+    seconds_share = std::min(
+        1.0, share * rest / std::max(last_cost, 1e-300) * results.last_seconds / std::max(results.seconds_left, 1e-9));
+  }
+  NextPass next;
+  next.gathered_scale = std::max(share * gathered_rest, 0.25);
+  next.direct_scale = std::max(share * direct_rest, 0.25);
+  next.settings = pass_of(next.gathered_scale, next.direct_scale);
+  const double direct_after = direct_part / (results.direct_effort + next.direct_scale);
+  const double gathered_after = gathered_part / (results.gathered_effort + next.gathered_scale);
+  next.predicted_error = std::sqrt(direct_after + gathered_after + fixed);
+  next.share_of_rest = has_budget ? seconds_share : share;
+  return next;
+}
+
+}  // namespace radbake::radiosity

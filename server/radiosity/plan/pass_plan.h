@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace radbake::radiosity {
+
+/// What one pass over the whole map spends, all replicates together.
+struct PassSettings {
+  int rays_per_row = 0;
+  int patch_light_samples = 0;  ///< shadow rays to emitters, a patch
+  int rays_per_texel = 0;       ///< of texels that gather alone
+  int rays_per_node = 0;        ///< of texels that others are interpolated from
+  int light_samples = 0;        ///< shadow rays to emitters, a texel; where they adapt, their mean
+  double gathered_weight = 0;   ///< against other passes
+
+  bool operator==(const PassSettings&) const = default;
+};
+
+/// Where the error stands after a pass, as shares of the mean irradiance, and what it took.
+struct PassResults {
+  double error = 0;  ///< estimated relative RMSE, all parts
+  double direct_sampling = 0, gathered_sampling = 0, discretisation = 0, algebraic = 0;
+  double direct_effort = 0, gathered_effort = 0;  ///< scales of all passes so far, added up
+  double direct_rays = 0, gathered_rays = 0;      ///< of all passes so far, added up
+  int num_passes = 0;
+  double last_direct_scale = 0, last_gathered_scale = 0;
+  double last_seconds = 0;   ///< wall, of the last pass
+  double seconds_left = -1;  ///< of a time budget; negative: there is none
+};
+
+/// A pass of a scale: 1 is the first pass, the coarsest that tells its own error.
+PassSettings pass_of(double gathered_scale, double direct_scale);
+
+struct NextPass {
+  PassSettings settings;
+  double gathered_scale = 0, direct_scale = 0;
+  double predicted_error = 0;
+  /// Of the work that is left to reach the target (or to fill the budget), this pass's share.
+  double share_of_rest = 1;
+};
+
+/// Why there is no other pass. Empty: what was asked holds.
+struct NoPass {
+  std::string limited_by;
+};
+
+/// The next pass towards a target, as cheap as the errors so far say: sampling errors fall with the square root of the
+/// effort, and the direct and the gathered part get what buys the most (the least cost c_d N_d + c_g N_g at which
+/// S_d / N_d + S_g / N_g is what the other errors leave of the target). It aims at 0.8 x the target and is done at 0.9.
+/// Within a budget, passes double until the last one fills what is left. Time decides only how large a pass is and
+/// whether there is one. `no_pass` says why there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
+std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass);
+
+}  // namespace radbake::radiosity

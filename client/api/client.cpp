@@ -148,6 +148,14 @@ Result<v1::Bake> Client::cancel(const std::string& name, std::stop_token stop) {
       [&](auto* context, auto* response) { return connection_->bakes->CancelBake(context, request, response); });
 }
 
+Result<v1::Bake> Client::finish(const std::string& name, std::stop_token stop) {
+  v1::FinishBakeRequest request;
+  request.set_name(name);
+  return call_with_retries<v1::Bake>(
+      *connection_, connection_->options.call_deadline, stop,
+      [&](auto* context, auto* response) { return connection_->bakes->FinishBake(context, request, response); });
+}
+
 std::string make_request_id() {
   std::array<unsigned char, 16> random{};
   RADBAKE_CHECK_EQ(getrandom(random.data(), random.size(), 0), static_cast<ssize_t>(random.size()));

@@ -79,6 +79,8 @@ class Client {
   Result<std::vector<v1::Bake>> list(std::stop_token stop = {});
   /// Asks a bake to stop; it has not stopped when this returns.
   Result<v1::Bake> cancel(const std::string& name, std::stop_token stop = {});
+  /// Asks a bake to end with the best result that it has; it has not ended when this returns.
+  Result<v1::Bake> finish(const std::string& name, std::stop_token stop = {});
 
   /// Follows a bake to its end and returns it in its terminal state. Survives broken streams and restarts of the
   /// server: each event arrives once, in order; after a break the callback sees another snapshot.

@@ -25,6 +25,7 @@ ExitCode run_plan(const CommandContext& context);
 ExitCode run_list(const CommandContext& context);
 ExitCode run_watch(const CommandContext& context);
 ExitCode run_cancel(const CommandContext& context);
+ExitCode run_finish(const CommandContext& context);
 ExitCode run_download(const CommandContext& context);
 ExitCode run_capabilities(const CommandContext& context);
 /// Of two files; needs no server.

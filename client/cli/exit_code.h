@@ -13,7 +13,8 @@ enum ExitCode : int {
   kServerUnreachable = 4,
   kBakeFailed = 5,
   kCancelledExit = 6,
-  kLeft = 130,  ///< Ctrl-C in watch, as shells say it: the bake goes on
+  kTargetMissed = 7,  ///< submit --strict: all is written, and the error that was asked for was not reached
+  kLeft = 130,        ///< Ctrl-C in watch, as shells say it: the bake goes on
 };
 
 /// The exit code for a call that failed.

@@ -6,7 +6,8 @@ namespace radbake::cli {
 
 inline constexpr char kServerHelp[] = "HOST:PORT or unix:PATH of a radbaked (environment: RADBAKE_SERVER)";
 inline constexpr char kExitCodes[] =
-    "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, 5 bake failed, 6 cancelled, 130 left by Ctrl-C.\n";
+    "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, 5 bake failed, 6 cancelled, 7 error asked for "
+    "not reached (--strict), 130 left by Ctrl-C.\n";
 
 inline constexpr char kMainFooter[] =
     "\nExamples:\n"
@@ -22,10 +23,12 @@ inline constexpr char kSubmitFooter[] =
     "                   light by vertex as _IRRADIANCE\n"
     "  lightmap_N.exr   irradiance in lx, linear Rec.709, float32; alpha is coverage; see --encoding\n"
     "  lightmap_N_direct.exr, lightmap_N_indirect.exr, lightmap_N_ao.exr   where --layers asks for them\n"
+    "  error_N.exr      standard error of each of its texels, lx\n"
     "  lightmap_N.png   an exposed preview, for the eye only\n"
     "  lightmaps.json   which primitive of which node lies where in which lightmap\n"
     "  report.json      what was planned, what was done, how well, and how long it took beside what was predicted\n"
-    "The first line on stdout is the job's name. Ctrl-C cancels the job.\n"
+    "The first line on stdout is the job's name. Ctrl-C ends the job with the best so far, which is written; a second\n"
+    "Ctrl-C cancels it, a third does not wait for that.\n"
     "\nExamples:\n"
     "  radbake submit room.glb -o baked/\n"
     "      the lightmap is the smallest that gives 32 texels a metre; meshes without a usable TEXCOORD_1 are "
@@ -34,7 +37,13 @@ inline constexpr char kSubmitFooter[] =
     "      sheets of 1024 texels, as many as it takes; for an engine that reads RGBM too\n"
     "  radbake submit town.glb -o baked/ --output vertices --vertex-colors\n"
     "      no lightmap: light at each vertex, and as COLOR_0 for viewers that know nothing else\n"
-    "  radbake submit room.glb -o baked/ --force --atlas-size 512 --rays 256\n"
+    "  radbake submit room.glb -o baked/ --max-error 2%\n"
+    "      refined until the lightmaps are within 2 %, which report.json and the last line say with an interval\n"
+    "  radbake submit room.glb -o baked/ --time-budget 30s\n"
+    "      the best of half a minute; with --max-error too, whichever comes first\n"
+    "  radbake submit room.glb -o baked/ --quality production --time-budget 10m --strict || echo \"not good enough\"\n"
+    "      exit code 7 where the time was up before the error was reached\n"
+    "  radbake submit room.glb -o baked/ --force --quality draft\n"
     "      a quick preview over the results of an earlier bake\n"
     "  radbake submit house.glb -o baked/ --sky 3000,3500,5000 --sun 0.4,-1,0.3:80000,76000,70000\n"
     "      daylight: a blue sky, and a sun that stands high\n"
@@ -62,6 +71,7 @@ inline constexpr char kPlanFooter[] =
     "\nExamples:\n"
     "  radbake plan room.glb\n"
     "  radbake plan room.glb --sun 0.4,-1,0.3:80000,76000,70000 --rays 1024\n"
+    "  radbake plan room.glb --max-error 2%\n"
     "  radbake plan room.glb --effect interreflection=off\n"
     "      what is left without it, and what it would take\n"
     "  radbake plan room.glb --json | jq -r '.effects[] | select(.state == \"on\") | .effect'\n"
@@ -77,6 +87,13 @@ inline constexpr char kWatchFooter[] =
     "\nExamples:\n"
     "  radbake watch bakes/3f9c --server bakery:7419\n"
     "  radbake watch bakes/3f9c && radbake download bakes/3f9c -o baked/\n\n";
+
+inline constexpr char kFinishFooter[] =
+    "\nThe bake ends at the end of its first pass, or at once in a later one, and has succeeded then. Returns at once; a\n"
+    "bake that has ended stays as it is.\n"
+    "\nExamples:\n"
+    "  radbake finish bakes/3f9c --server bakery:7419\n"
+    "  radbake finish bakes/3f9c && radbake watch bakes/3f9c && radbake download bakes/3f9c -o baked/\n\n";
 
 inline constexpr char kCancelFooter[] =
     "\nAsks the bake to stop and returns at once; a bake that has ended stays as it is.\n"

@@ -3,6 +3,8 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "client/cli/exit_code.h"
 
 namespace radbake::cli {
@@ -37,17 +39,15 @@ Interrupt::~Interrupt() {
 
 void Interrupt::wait_for_signals() {
   const sigset_t set = signals_to_stop();
-  for (int count = 1;; ++count) {
+  for (int count = 0;;) {
     int signal = 0;
     sigwait(&set, &signal);
     if (is_over_) return;
-    if (count == 1) {
-      once_.request_stop();
-    } else if (count == 2) {
-      twice_.request_stop();
-    } else {
-      _exit(kCancelledExit);
-    }
+    if (count >= 3) _exit(kCancelledExit);
+    count = signal == SIGINT ? count + 1 : std::max(count + 1, 2);
+    if (count >= 1) once_.request_stop();
+    if (count >= 2) twice_.request_stop();
+    if (count >= 3) thrice_.request_stop();
   }
 }
 

@@ -99,6 +99,18 @@ ExitCode run_cancel(const CommandContext& context) {
   return kDone;
 }
 
+ExitCode run_finish(const CommandContext& context) {
+  Result<Session> session = open_session(context);
+  if (!session.ok()) return fail(context, session.error());
+  const Result<v1::Bake> bake = session->client.finish(context.line.job, context.interrupt.once());
+  if (!bake.ok()) return fail(context, bake.error());
+  const bool has_ended = bake->state() >= v1::SUCCEEDED;
+  context.reporter.answer(
+      bake->name() + (has_ended ? "  " : "  asked to finish while ") + stage_name(bake->state()) + "\n",
+      to_json(*bake));
+  return kDone;
+}
+
 ExitCode run_download(const CommandContext& context) {
   Result<ResultFolder> folder = ResultFolder::open(context.line.folder, context.line.force);
   if (!folder.ok()) return fail(context, folder.error(), kUsage);

@@ -32,7 +32,7 @@ Json describe_layer(const LightmapFiles& lightmap, const FileChoices& files) {
                {"unit", lightmap.layer.unit()},
                {"maximum", lightmap.max_irradiance},
                {"files", Json::array()}};
-  for (const Encoding encoding : files.encodings) {
+  for (const Encoding encoding : encodings_of(lightmap.layer, files)) {
     json["files"].push_back(describe(lightmap.layer.name(), encoding, lightmap.intensity));
   }
   return json;
@@ -69,7 +69,20 @@ Json describe_mesh(const gltf::GltfScene& scene, const MeshResults& results, std
   return mesh;
 }
 
+/// lightmap_0_direct and error_0 are laid out as lightmap_0.
+bool shares_layout(const v1::Layer& layer, const v1::Layer& lightmap) {
+  constexpr std::string_view kLightmap = "lightmap_";
+  return layer.name().starts_with(lightmap.name() + "_") ||
+         (is_error_map(layer) && layer.name() == "error_" + lightmap.name().substr(kLightmap.size()));
+}
+
 }  // namespace
+
+bool is_error_map(const v1::Layer& layer) { return layer.quantity() == "standard_error"; }
+
+std::vector<Encoding> encodings_of(const v1::Layer& layer, const FileChoices& files) {
+  return is_error_map(layer) ? std::vector{Encoding::kExr} : files.encodings;
+}
 
 std::string image_name(const std::string& layer, Encoding encoding) {
   switch (encoding) {
@@ -92,10 +105,10 @@ Json make_lightmaps_json(const std::vector<LightmapFiles>& lightmaps, const std:
     map.update(describe_layer(lightmap, files));
     map["moz_lightmap"] = {
         {"encoding", "png"}, {"bits", "uint16"}, {"intensity", lightmap.intensity}, {"colour_space", kColourSpace}};
-    // Parts of the same light, or openness, in the same layout.
+    // Parts of the same light, openness, or errors, in the same layout.
     for (const LightmapFiles& extra : extra_layers) {
       const std::string& name = extra.layer.name();
-      if (!name.starts_with(lightmap.layer.name() + "_")) continue;
+      if (!shares_layout(extra.layer, lightmap.layer)) continue;
       Json layer = {{"name", name}};
       layer.update(describe_layer(extra, files));
       map["layers"].push_back(std::move(layer));

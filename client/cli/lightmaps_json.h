@@ -14,6 +14,12 @@ namespace radbake::cli {
 /// The file's name of a layer in an encoding: lightmap_0.exr, lightmap_0.hdr, lightmap_0_rgbm.png.
 std::string image_name(const std::string& layer, Encoding encoding);
 
+/// Whether a layer holds the standard errors of a lightmap: error_N.
+bool is_error_map(const v1::Layer& layer);
+
+/// The encodings of a layer's files: standard errors are numbers and stay float32.
+std::vector<Encoding> encodings_of(const v1::Layer& layer, const FileChoices& files);
+
 /// A lightmap of a result folder.
 struct LightmapFiles {
   v1::Layer layer;
@@ -24,7 +30,7 @@ struct LightmapFiles {
 /// lightmaps.json: which primitive of which node lies where in which file, and what the numbers in the files mean.
 /// Every key is described in client/cli/docs/lightmaps.md.
 ///
-/// `extra_layers`: lightmap_N_direct and the like, listed under the lightmap_N whose layout they share.
+/// `extra_layers`: lightmap_N_direct and the like, and error_N, listed under the lightmap_N whose layout they share.
 /// `node_names`: of the file, [nodes]. Equal bakes give equal bytes.
 nlohmann::ordered_json make_lightmaps_json(const std::vector<LightmapFiles>& lightmaps,
                                            const std::vector<LightmapFiles>& extra_layers, const FileChoices& files,

@@ -16,6 +16,7 @@ ExitCode run(const CommandContext& context) {
     case Command::kList: return run_list(context);
     case Command::kWatch: return run_watch(context);
     case Command::kCancel: return run_cancel(context);
+    case Command::kFinish: return run_finish(context);
     case Command::kDownload: return run_download(context);
     case Command::kCapabilities: return run_capabilities(context);
     case Command::kCompare: return run_compare(context);

@@ -10,6 +10,7 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/help_texts.h"
 #include "client/options/effect_options.h"
+#include "client/options/target_options.h"
 #include "client/options/words.h"
 #include "common/base/version.h"
 
@@ -31,6 +32,7 @@ class Parser {
     add_plan();
     add_command(Command::kList, "list", "List the server's bakes, newest first", kListFooter);
     add_job(add_command(Command::kWatch, "watch", "Follow a bake to its end", kWatchFooter));
+    add_job(add_command(Command::kFinish, "finish", "Ask a bake to end with the best that it has", kFinishFooter));
     add_job(add_command(Command::kCancel, "cancel", "Ask a bake to stop", kCancelFooter));
     CLI::App* download =
         add_command(Command::kDownload, "download", "Write a bake's results to a folder", kDownloadFooter);
@@ -70,6 +72,9 @@ class Parser {
     }
     if (const std::string problem = options::find_contradiction(line_.bake); !problem.empty()) {
       return EarlyExit{kUsage, "", problem + "\n"};
+    }
+    if (line_.strict && options::asked_error(line_.bake) == 0) {
+      return EarlyExit{kUsage, "", "--strict needs an error to reach: --max-error or --quality\n"};
     }
     // Both the name that submit prints and the bare id name a job.
     if (!line_.job.empty() && line_.job.rfind("bakes/", 0) != 0) line_.job = "bakes/" + line_.job;
@@ -129,6 +134,8 @@ class Parser {
     sub->add_flag("--dry-run", line_.dry_run,
                   "Check all that a submit checks and print the plan, as radbake plan does; bakes and writes nothing");
     options::add_bake_options(*sub, line_.bake);
+    sub->add_flag("--strict", line_.strict,
+                  "Exit with 7 where the error asked for was not reached; all files are written all the same");
     add_files(sub);
   }
 

@@ -9,7 +9,7 @@
 
 namespace radbake::cli {
 
-enum class Command { kSubmit, kPlan, kList, kWatch, kCancel, kDownload, kCapabilities, kCompare };
+enum class Command { kSubmit, kPlan, kList, kWatch, kFinish, kCancel, kDownload, kCapabilities, kCompare };
 
 using options::BakeChoices;
 
@@ -39,11 +39,12 @@ struct CommandLine {
   bool json = false;
   std::filesystem::path scene;   ///< submit, plan; download: empty where it is not given
   BakeChoices bake;              ///< submit, plan
-  std::string job;               ///< watch, cancel, download: bakes/ID
+  std::string job;               ///< watch, finish, cancel, download: bakes/ID
   std::filesystem::path folder;  ///< submit, download
   bool force = false;            ///< submit, download
   FileChoices files;             ///< submit, download
   bool dry_run = false;          ///< submit
+  bool strict = false;           ///< submit: an error that is not reached is an exit code of its own
   double plan_seconds = 60;      ///< plan: how long to wait for the answer
   CompareChoices compare;        ///< compare
 

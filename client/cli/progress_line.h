@@ -8,9 +8,17 @@ namespace radbake::cli {
 /// A time left, for people: "8 s", "2 min 05 s", "3 h 10 min".
 std::string format_seconds(double seconds);
 
-/// One line of progress: stage, bar, percentage, time left where it is known.
-/// `width`: columns of the terminal; the bar shrinks, then goes. `fraction`: negative where it is not known.
-std::string format_progress(const std::string& stage, double fraction, double seconds_left, int width, bool has_color);
+/// What a line of progress tells.
+struct ProgressView {
+  std::string stage;
+  double fraction = -1;      ///< negative: not known
+  double seconds_left = -1;  ///< negative: not known
+  std::string detail = {};   ///< what is known of the result so far
+};
+
+/// One line of progress: stage, bar, percentage, detail, time left where it is known.
+/// `width`: columns of the terminal; the bar shrinks, then goes, then what is too long. 0: no bar, and no bound.
+std::string format_progress(const ProgressView& view, int width, bool has_color);
 
 /// Progress on stderr: a line that redraws itself on a terminal, else a plain line at each new stage and now and then.
 class ProgressLine {
@@ -20,8 +28,7 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// `seconds_left`: negative where it is not known.
-  void show(const std::string& stage, double fraction, double seconds_left);
+  void show(const ProgressView& view);
   /// Takes the line off the terminal, so that other text may be printed.
   void clear();
   bool has_color() const { return has_color_; }

@@ -4,6 +4,7 @@
 
 #include "client/cli/predictions.h"
 #include "client/cli/proto_json.h"
+#include "client/cli/reached_error.h"
 
 namespace radbake::cli {
 
@@ -26,7 +27,7 @@ Json make_report(const v1::Bake& bake, const std::vector<LayerFiles>& layers, co
   for (const LayerFiles& files : layers) {
     Json layer = to_json(files.layer);
     layer["image"] = files.image;
-    layer["preview"] = files.preview;
+    if (!files.preview.empty()) layer["preview"] = files.preview;
     outputs.push_back(std::move(layer));
   }
 
@@ -44,6 +45,7 @@ Json make_report(const v1::Bake& bake, const std::vector<LayerFiles>& layers, co
   for (const auto& [key, value] : server.items()) {
     if (key != "run" && key != "warnings" && !report.contains(key)) report[key] = value;
   }
+  if (bake.result().report().has_error()) report["error"] = error_json(bake.result().report().error());
   report["warnings"] = std::move(warnings);
 
   Json run = server.contains("run") ? server["run"] : Json::object();

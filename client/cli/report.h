@@ -23,7 +23,7 @@ struct SceneReport {
 struct LayerFiles {
   v1::Layer layer;
   std::string image;    ///< lightmap_0.exr
-  std::string preview;  ///< lightmap_0.png
+  std::string preview;  ///< lightmap_0.png; empty: none
 };
 
 /// report.json: the server's report, and the client's part of it.

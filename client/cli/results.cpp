@@ -95,7 +95,7 @@ class ResultWriter {
   Result<void> write_images(const image::ImageCodec& images, const Plane& plane) {
     const int width = plane.width(), height = plane.height(), channels = plane.channels();
     const std::string& layer = plane.files.layer.name();
-    for (const Encoding encoding : choices_.encodings) {
+    for (const Encoding encoding : encodings_of(plane.files.layer, choices_)) {
       const std::filesystem::path path = add(image_name(layer, encoding));
       const auto write = [&]() -> Result<void> {
         switch (encoding) {
@@ -109,6 +109,7 @@ class ResultWriter {
       };
       RADBAKE_RETURN_IF_ERROR(write());
     }
+    if (is_error_map(plane.files.layer)) return {};  // a picture of it would say nothing
     return images.write_preview_png(add(layer + ".png"), width, height, channels, plane.values);
   }
 
@@ -195,7 +196,8 @@ Result<void> write_results(api::Client& client, const ResultRequest& request, Re
   for (const Plane& plane : planes) {
     RADBAKE_RETURN_IF_ERROR(writer.write_images(*images, plane));
     const std::string& name = plane.files.layer.name();
-    layers.push_back({plane.files.layer, image_name(name, request.files.encodings.front()), name + ".png"});
+    layers.push_back({plane.files.layer, image_name(name, encodings_of(plane.files.layer, request.files).front()),
+                      is_error_map(plane.files.layer) ? "" : name + ".png"});
   }
   if (meshes) RADBAKE_RETURN_IF_ERROR(writer.write_scene(images, planes, *request.scene, *meshes));
   stages.end_stage("write");

@@ -4,29 +4,62 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/predictions.h"
+#include "client/cli/reached_error.h"
 #include "client/cli/requests.h"
 #include "client/cli/results.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/send_scene.h"
 #include "client/image/image_codec.h"
+#include "client/options/target_options.h"
 
 namespace radbake::cli {
 namespace {
 
-/// Follows the bake to its end. A first Ctrl-C cancels it and goes on waiting, a second one gives up.
+/// Follows the bake to its end. A first Ctrl-C asks for the best so far and goes on waiting, a second one cancels and
+/// goes on waiting, a third one gives up.
 Result<v1::Bake> follow(const CommandContext& context, api::Client& client, const std::string& name) {
+  const Interrupt& interrupt = context.interrupt;
   std::uint64_t sequence = 0;
-  const auto show = [&](const v1::WatchBakeResponse& response) {
-    if (response.has_event()) sequence = response.event().sequence();
-    context.reporter.watched(response);
+  const auto watch = [&](std::stop_token stop) {
+    return client.watch(
+        name, {sequence, false},
+        [&](const v1::WatchBakeResponse& response) {
+          if (response.has_event()) sequence = response.event().sequence();
+          context.reporter.watched(response);
+        },
+        stop);
   };
-  Result<v1::Bake> bake = client.watch(name, {}, show, context.interrupt.once());
-  if (bake.ok() || bake.error().code != ErrorCode::kCancelled || !context.interrupt.once().stop_requested())
-    return bake;
-  context.reporter.note("cancelling " + name + " (Ctrl-C again: do not wait)");
-  const Result<v1::Bake> asked = client.cancel(name, context.interrupt.twice());
-  if (!asked.ok()) return asked;
-  return client.watch(name, {sequence, false}, show, context.interrupt.twice());
+  const auto is_interrupted = [](const Result<v1::Bake>& bake, std::stop_token stop) {
+    return !bake.ok() && bake.error().code == ErrorCode::kCancelled && stop.stop_requested();
+  };
+
+  Result<v1::Bake> bake = watch(interrupt.once());
+  if (is_interrupted(bake, interrupt.once()) && !interrupt.twice().stop_requested()) {
+    context.reporter.note("ending " + name + " with the best so far (Ctrl-C again: cancel)");
+    bake = client.finish(name, interrupt.twice());
+    if (bake.ok()) bake = watch(interrupt.twice());
+  }
+  if (is_interrupted(bake, interrupt.twice())) {
+    context.reporter.note("cancelling " + name + " (Ctrl-C again: do not wait)");
+    bake = client.cancel(name, interrupt.thrice());
+    if (bake.ok()) bake = watch(interrupt.thrice());
+  }
+  return bake;
+}
+
+/// Says what error was reached, as a warning where it is not what was wanted. False: an error that was asked for was
+/// not reached.
+bool tell_error(const CommandContext& context, const v1::BakeReport& report) {
+  const bool is_reached = options::asked_error(context.line.bake) == 0 || report.error().reached();
+  const std::string line = report.has_error() ? reached_line(report.error()) : "the server tells no error";
+  if (!is_reached) {
+    context.reporter.warning({"error_not_reached", line});
+  } else if (context.interrupt.once().stop_requested()) {
+    context.reporter.warning({"ended_early", "ended early, with the best so far: " + line});
+  } else if (report.has_error()) {
+    context.reporter.note(line);
+  }
+  return is_reached;
 }
 
 }  // namespace
@@ -75,6 +108,7 @@ ExitCode run_submit(const CommandContext& context) {
   stages.end_stage("bake");
   if (bake->state() != v1::SUCCEEDED) return fail(context, error_of(*bake), exit_code_of(*bake));
 
+  const bool is_reached = tell_error(context, bake->result().report());
   const std::optional<SceneReport> report = std::move(read->report);
   const std::optional<BakedScene> scene = std::move(*kept);
   const Result<void> written = write_results(session->client, {*bake, report, scene, line.files}, *folder, stages,
@@ -82,7 +116,7 @@ ExitCode run_submit(const CommandContext& context) {
   if (!written.ok()) return fail(context, session->explain(written.error()));
   const std::string compared = prediction_line(bake->result().report().run());
   if (!compared.empty()) context.reporter.note(compared);
-  return kDone;
+  return is_reached || !line.strict ? kDone : kTargetMissed;
 }
 
 }  // namespace radbake::cli

@@ -1,6 +1,7 @@
 #include <cstdio>
 
 #include "client/cli/progress_line.h"
+#include "client/cli/reached_error.h"
 #include "client/cli/reporter.h"
 
 namespace radbake::cli {
@@ -12,7 +13,7 @@ class TextReporter final : public Reporter {
 
   void warning(const Warning& warning) override { say("warning: ", "33", warning.text); }
 
-  void stage(const std::string& name, double fraction) override { line_.show(name, fraction, -1); }
+  void stage(const std::string& name, double fraction) override { line_.show({name, fraction}); }
 
   void watched(const v1::WatchBakeResponse& response) override {
     if (response.has_progress()) {
@@ -22,7 +23,7 @@ class TextReporter final : public Reporter {
       if (bake.has_progress()) {
         show(bake.progress());
       } else {
-        line_.show(stage_name(bake.state()), 0, -1);
+        line_.show({stage_name(bake.state()), 0});
       }
     } else if (response.has_event() && response.event().attempt() > 1 && response.event().state() < v1::SUCCEEDED) {
       // Progress shows an ordinary change of state; that a bake starts again needs words.
@@ -45,7 +46,12 @@ class TextReporter final : public Reporter {
 
  private:
   void show(const v1::Progress& progress) {
-    line_.show(stage_name(progress.state()), progress.fraction(), progress.seconds_left());
+    ProgressView view{stage_name(progress.state()), progress.fraction(), progress.seconds_left()};
+    view.detail = progress_words(progress);
+    // Once there is a whole map, passes over it follow each other faster than their stages can be read.
+    const bool is_between = progress.state() > v1::QUEUED && progress.state() < v1::WRITING;
+    if (!view.detail.empty() && is_between) view.stage = "pass " + std::to_string(progress.pass() + 1);
+    line_.show(view);
   }
 
   void print(const std::string& text) {

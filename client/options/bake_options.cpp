@@ -6,6 +6,7 @@
 #include <string>
 
 #include "client/options/effect_options.h"
+#include "client/options/target_options.h"
 #include "client/options/values.h"
 #include "client/options/words.h"
 
@@ -33,13 +34,6 @@ const std::map<std::string, v1::Solver> kSolvers = {
     {"jacobi", v1::SOLVER_JACOBI},       {"gauss-seidel", v1::SOLVER_GAUSS_SEIDEL},
     {"southwell", v1::SOLVER_SOUTHWELL}, {"shooting", v1::SOLVER_SHOOTING},
     {"krylov", v1::SOLVER_KRYLOV}};
-
-/// The value of a parser, or CLI11's exception, which never leaves this file.
-template <typename T>
-T value_or_throw(const char* option, Result<T> parsed) {
-  if (!parsed.ok()) throw CLI::ValidationError(option, parsed.error().message);
-  return std::move(parsed).value();
-}
 
 bool is_all_digits(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
@@ -131,6 +125,7 @@ void add_bake_options(CLI::App& command, BakeChoices& choices) {
           "facing surface, and its angular diameter: 0.53 where none is given, 0 for hard shadows")
       ->type_name("DX,DY,DZ:R,G,B[:DEGREES]");
   add_effect_options(command, choices);
+  add_target_options(command, choices);
   command
       .add_option_function<std::string>(
           "--form-factors",
@@ -163,7 +158,8 @@ void add_bake_options(CLI::App& command, BakeChoices& choices) {
       ->type_name("N[K|M|G]");
   command
       .add_option("--rays", choices.rays,
-                  "Hemisphere rays a texel; a patch's row gets the same; default: the server's, 256")
+                  "Hemisphere rays a texel, whatever error comes of it; a patch's row gets the same; default: the "
+                  "server's, 256")
       ->check(check_positive, "")
       ->type_name("N");
   command
@@ -208,6 +204,8 @@ v1::BakeSettings to_settings(const BakeChoices& choices) {
   }
   for (const v1::ExtraLayer layer : choices.layers) settings.add_layers(layer);
   if (choices.ao_distance != kDefaultAoDistance) settings.set_ao_distance(choices.ao_distance);
+  settings.set_max_error(asked_error(choices));
+  settings.set_time_budget_ms(choices.time_budget_ms);
   return settings;
 }
 

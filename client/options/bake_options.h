@@ -33,7 +33,10 @@ struct BakeChoices {
   std::optional<DirectionalLight> sun;
   std::map<std::string, v1::EffectChoice> effects;  ///< by name; others: v1::EFFECT_CHOICE_AUTO
   std::set<v1::ExtraLayer> layers;
-  double ao_distance = 0;  ///< metres
+  double ao_distance = 0;            ///< metres
+  double max_error = 0;              ///< relative RMSE to reach, as a fraction
+  std::string quality;               ///< a name of kQualities; never beside max_error
+  std::uint64_t time_budget_ms = 0;  ///< from the server's acceptance to the last tile
 };
 
 /// Gives a command the options of a bake. `choices` outlives it. Bad values throw CLI11's exception when it parses.

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string>
 
+#include "client/options/target_options.h"
 #include "client/options/words.h"
 
 namespace radbake::options {
@@ -80,7 +81,7 @@ std::string find_contradiction(const BakeChoices& choices) {
     return "--layers are lightmaps, and --output vertices makes none";
   }
   if (choices.ao_distance > 0 && !choices.layers.contains(v1::EXTRA_LAYER_AO)) return "--ao-distance needs --layers ao";
-  return "";
+  return find_target_contradiction(choices);
 }
 
 }  // namespace radbake::options

@@ -1,5 +1,6 @@
 #include "client/options/values.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numbers>
@@ -91,6 +92,35 @@ Result<std::uint64_t> parse_bytes(const std::string& text) {
   value <<= 10 * step;
   if (value < kLeast) return bad;
   return value;
+}
+
+Result<double> parse_share(const std::string& text) {
+  const bool is_percentage = text.ends_with('%');
+  double value = 0;
+  const bool is_number = parse_number(std::string_view(text).substr(0, text.size() - is_percentage), value);
+  if (is_percentage) value /= 100;
+  if (is_number && value > 0 && value < 1) return value;
+  return invalid_argument(
+      "'" + text + "' is neither a percentage such as 2% nor a fraction such as 0.02, above 0 and " + "below 100 %");
+}
+
+Result<std::uint64_t> parse_milliseconds(const std::string& text) {
+  struct Unit {
+    std::string_view name;
+    double milliseconds;
+  };
+  constexpr Unit kUnits[] = {{"", 1e3}, {"s", 1e3}, {"ms", 1}, {"m", 6e4}, {"h", 3.6e6}};
+  constexpr double kMost = 30 * 24 * 3.6e6;
+  const std::size_t length = std::min(text.find_first_of("smh"), text.size());
+  double value = 0;
+  const bool is_number = parse_number(std::string_view(text).substr(0, length), value);
+  for (const Unit& unit : kUnits) {
+    const double milliseconds = std::round(value * unit.milliseconds);
+    if (is_number && text.substr(length) == unit.name && milliseconds >= 1 && milliseconds <= kMost) {
+      return static_cast<std::uint64_t>(milliseconds);
+    }
+  }
+  return invalid_argument("'" + text + "' is not a time from 1ms to 720h, such as 30 or 30s, 500ms, 5m, 2h");
 }
 
 }  // namespace radbake::options

@@ -36,4 +36,12 @@ Result<SkyImage> parse_sky_image(const std::string& text);
 /// Errors: kInvalidArgument names the value.
 Result<std::uint64_t> parse_bytes(const std::string& text);
 
+/// "N%" or a fraction: above 0 and below 1. Returns the fraction.
+/// Errors: kInvalidArgument names the value.
+Result<double> parse_share(const std::string& text);
+
+/// "N" or "Ns" (seconds), "Nms", "Nm" (minutes), "Nh": milliseconds, from 1 to 30 days.
+/// Errors: kInvalidArgument names the value.
+Result<std::uint64_t> parse_milliseconds(const std::string& text);
+
 }  // namespace radbake::options

@@ -3,8 +3,19 @@
 #include <CLI/CLI.hpp>
 #include <map>
 #include <string>
+#include <utility>
+
+#include "common/base/result.h"
 
 namespace radbake::options {
+
+/// What a parser made of an option's text; CLI11's exception, which never leaves parse_command_line(), says what is
+/// wrong with it.
+template <typename T>
+T value_or_throw(const char* option, Result<T> parsed) {
+  if (!parsed.ok()) throw CLI::ValidationError(option, parsed.error().message);
+  return std::move(parsed).value();
+}
 
 /// The value of a word; CLI11's exception, which never leaves parse_command_line(), names the words that there are.
 template <typename T>

@@ -27,6 +27,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// Of a bake: what is done when its result is written.
+constexpr double kWritingFraction = 0.95;
 /// A budget that has gone by is still one: 0 would be none.
 constexpr double kLeastBudgetSeconds = 1e-3;
 
@@ -109,9 +111,13 @@ Result<v1::BakeResult> send_result(const radiosity::BakeOutcome& outcome, v1::Pr
 
   std::uint64_t total = mesh_data.size(), sent = 0;
   for (const radiosity::Layer& layer : outcome.layers) total += layer.values.size() * sizeof(float);
+  const double begun_at = std::max(progress.fraction(), kWritingFraction);
   const auto report_sent = [&](std::uint64_t bytes) {
     sent += bytes;
     progress.set_state(v1::WRITING);
+    // A bake that reached what was asked may have been expected to take longer.
+    progress.set_fraction(begun_at + (1 - begun_at) * static_cast<double>(sent) / static_cast<double>(total));
+    progress.set_seconds_left(-1);
     progress.set_steps_done(sent);
     progress.set_steps_total(total);
     stream.set_progress(progress);

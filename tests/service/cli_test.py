@@ -20,6 +20,9 @@ SCENES = pathlib.Path(sys.argv[2])
 CORNELL = SCENES / "cornell.glb"
 
 QUICK = ["--atlas-size", "64", "--rays", "16", "--max-patches", "300"]
+SMALL = ["--atlas-size", "64", "--max-patches", "300"]
+# Some seconds: for what is asked to finish before its end.
+STEADY = ["--atlas-size", "256", "--rays", "1024"]
 # Minutes of work on any machine: for what is cancelled long before its end.
 LONG = ["--atlas-size", "2048", "--rays", "65536"]
 # For what must not hang; no test depends on how long anything takes.
@@ -50,6 +53,21 @@ class CliTest(unittest.TestCase):
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
         return process
+
+    def wait_for_note(self, process, words):
+        """Reads stderr up to the line that holds the words."""
+        lines = []
+        for line in process.stderr:
+            lines.append(line)
+            if words in line:
+                return
+        self.fail(f"no '{words}' in {''.join(lines)}")
+
+    def interrupt_twice(self, process):
+        process.send_signal(signal.SIGINT)
+        self.wait_for_note(process, "with the best so far")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=LIMIT_SECONDS)
 
     def assert_exit(self, result, code):
         self.assertEqual(result.returncode, code, f"stdout: {result.stdout}\nstderr: {result.stderr}")
@@ -118,10 +136,29 @@ class PrivateServer(CliTest):
         report = json.loads((self.place / "out" / "report.json").read_text())
         self.assertAlmostEqual(report["energy"]["mean_irradiance"], 314.159, delta=0.4)
 
-    def test_ctrl_c_cancels_and_cleans_up(self):
-        process = self.start_cli("submit", CORNELL, "-o", self.place / "out", *LONG)
+    def test_ctrl_c_writes_the_best_so_far_and_says_so(self):
+        process = self.start_cli("submit", CORNELL, "-o", self.place / "out", *STEADY)
         self.assertRegex(process.stdout.readline(), r"^bakes/")
         process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=LIMIT_SECONDS)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertRegex(err, r"ending bakes/\w+ with the best so far \(Ctrl-C again: cancel\)")
+        self.assertIn("warning: ", err)
+        self.assertIn("lightmap_0.exr", out)
+        self.assertIn("lightmap_0.exr", os.listdir(self.place / "out"))
+        self.assert_nothing_left("out")
+
+    def test_a_second_ctrl_c_cancels_and_cleans_up(self):
+        process = self.start_cli("submit", CORNELL, "-o", self.place / "out", *LONG)
+        self.assertRegex(process.stdout.readline(), r"^bakes/")
+        self.interrupt_twice(process)
+        self.assertEqual(process.returncode, 6)
+        self.assert_nothing_left()
+
+    def test_sigterm_cancels_and_cleans_up(self):
+        process = self.start_cli("submit", CORNELL, "-o", self.place / "out", *LONG)
+        self.assertRegex(process.stdout.readline(), r"^bakes/")
+        process.send_signal(signal.SIGTERM)
         process.communicate(timeout=LIMIT_SECONDS)
         self.assertEqual(process.returncode, 6)
         self.assert_nothing_left()
@@ -182,7 +219,7 @@ class PrivateServer(CliTest):
         self.assert_nothing_left()
 
     def test_commands_on_jobs_need_a_server(self):
-        for arguments in (["list"], ["watch", "x"], ["cancel", "x"], ["download", "x", "-o", self.place / "out"]):
+        for arguments in (["list"], ["watch", "x"], ["finish", "x"], ["cancel", "x"], ["download", "x", "-o", self.place / "out"]):
             self.assert_exit(self.run_cli(*arguments), 2)
 
 
@@ -557,10 +594,23 @@ class SharedServer(CliTest):
         self.assert_exit(missing, 3)
         self.assertIn("nowhere.glb", missing.stderr)
 
-    def test_ctrl_c_in_submit_cancels_the_job(self):
-        process, name = self.start_long_bake()
-        process.send_signal(signal.SIGINT)
+    def test_a_bake_is_finished_by_others(self):
+        process = self.start_cli("submit", CORNELL, "-o", self.place / "out", *STEADY)
+        name = process.stdout.readline().strip()
+        finish = self.run_cli("finish", name.removeprefix("bakes/"))
+        self.assert_exit(finish, 0)
+        self.assertRegex(finish.stdout, rf"^{name}  asked to finish while ")
+        self.assert_exit(self.run_cli("finish", name), 0)
         process.communicate(timeout=LIMIT_SECONDS)
+        self.assertEqual(process.returncode, 0)
+        self.assertEqual(self.bakes()[0]["state"], "SUCCEEDED")
+        ended = self.run_cli("finish", name, "--json")
+        self.assert_exit(ended, 0)
+        self.assertEqual(json.loads(ended.stdout)["state"], "SUCCEEDED")
+
+    def test_ctrl_c_twice_in_submit_cancels_the_job(self):
+        process, name = self.start_long_bake()
+        self.interrupt_twice(process)
         self.assertEqual(process.returncode, 6)
         self.assertEqual([(bake["name"], bake["state"]) for bake in self.bakes()], [(name, "CANCELLED")])
         self.assertFalse((self.place / "long").exists())
@@ -585,7 +635,7 @@ class SharedServer(CliTest):
         self.assertEqual(submit.returncode, 6)
 
     def test_an_unknown_job_is_a_usage_error(self):
-        for arguments in (["watch", "nobody"], ["cancel", "nobody"], ["download", "nobody", "-o", self.place / "out"]):
+        for arguments in (["watch", "nobody"], ["finish", "nobody"], ["cancel", "nobody"], ["download", "nobody", "-o", self.place / "out"]):
             result = self.run_cli(*arguments)
             self.assert_exit(result, 2)
             self.assertIn("nobody", result.stderr)

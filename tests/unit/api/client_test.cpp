@@ -96,6 +96,17 @@ TEST(Client, SaysWhichBakeIsUnknown) {
   EXPECT_THAT(bake.error().message, HasSubstr("bakes/7"));
 }
 
+TEST(Client, AsksABakeToFinishUntilTheServerHears) {
+  FakeServer server;
+  Result<Client> client = Client::connect(server.address(), impatient());
+  ASSERT_TRUE(client.ok());
+  server.calls_to_refuse = 1;
+  const Result<v1::Bake> bake = client->finish("bakes/7");
+  ASSERT_TRUE(bake.ok()) << bake.error().message;
+  EXPECT_EQ(bake->name(), "bakes/7");
+  EXPECT_THAT(server.to_finish, ElementsAre("bakes/7", "bakes/7"));
+}
+
 TEST(RequestId, IsFreshEachTime) {
   std::set<std::string> ids;
   for (int i = 0; i < 100; ++i) ids.insert(make_request_id());

@@ -133,6 +133,13 @@ grpc::Status FakeServer::GetBake(Context* context, const v1::GetBakeRequest* req
   return unary(*context);
 }
 
+grpc::Status FakeServer::FinishBake(Context* context, const v1::FinishBakeRequest* request, v1::Bake* response) {
+  const std::scoped_lock lock(mutex_);
+  to_finish.push_back(request->name());
+  response->set_name(request->name());
+  return unary(*context);
+}
+
 grpc::Status FakeServer::ListBakes(Context* context, const v1::ListBakesRequest* request,
                                    v1::ListBakesResponse* response) {
   const std::scoped_lock lock(mutex_);

@@ -45,7 +45,8 @@ class FakeServer final : v1::Content::Service, v1::Bakes::Service, v1::Server::S
   std::vector<std::uint64_t> download_offsets;
   std::vector<std::uint64_t> watch_sequences;
   std::vector<std::string> request_ids;
-  std::string protocol;  ///< the metadata of the last unary call
+  std::vector<std::string> to_finish;  ///< names
+  std::string protocol;                ///< the metadata of the last unary call
 
  private:
   using Context = grpc::ServerContext;
@@ -59,6 +60,7 @@ class FakeServer final : v1::Content::Service, v1::Bakes::Service, v1::Server::S
   grpc::Status SubmitBake(Context*, const v1::SubmitBakeRequest*, v1::Bake*) override;
   grpc::Status ListBakes(Context*, const v1::ListBakesRequest*, v1::ListBakesResponse*) override;
   grpc::Status GetBake(Context*, const v1::GetBakeRequest*, v1::Bake*) override;
+  grpc::Status FinishBake(Context*, const v1::FinishBakeRequest*, v1::Bake*) override;
   grpc::Status WatchBake(Context*, const v1::WatchBakeRequest*, grpc::ServerWriter<v1::WatchBakeResponse>*) override;
 
   std::filesystem::path folder_;

@@ -88,6 +88,22 @@ TEST(LightmapsJson, ListsTheLayersThatShareALayout) {
                               R"("colour_space":"linear Rec.709"}]})");
 }
 
+TEST(LightmapsJson, ListsTheStandardErrorsOfALightmapAsFloats) {
+  Fixture fixture;
+  fixture.files.encodings = {Encoding::kRgbmPng, Encoding::kExr};
+  for (const char* name : {"error_0", "error_01"}) {
+    fixture.extra_layers.push_back(fixture.lightmap);
+    fixture.extra_layers.back().layer.set_name(name);
+    fixture.extra_layers.back().layer.set_quantity("standard_error");
+    fixture.extra_layers.back().max_irradiance = 2.5;
+  }
+  const Json layers = fixture.json()["lightmaps"][0]["layers"];
+  ASSERT_EQ(layers.size(), 1u);
+  EXPECT_EQ(layers[0].dump(), R"({"name":"error_0","quantity":"standard_error","unit":"lx","maximum":2.5,)"
+                              R"("files":[{"file":"error_0.exr","encoding":"exr","bits":"float32",)"
+                              R"("colour_space":"linear Rec.709"}]})");
+}
+
 TEST(LightmapsJson, DescribesLightByVertexWhereThereIsAny) {
   Fixture fixture;
   fixture.results.uv_sources[0] = v1::UV_NONE;

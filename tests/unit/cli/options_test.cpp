@@ -124,11 +124,13 @@ TEST_F(Options, TakesTheServerFromTheEnvironment) {
 TEST_F(Options, NamesAJobByItsIdToo) {
   EXPECT_EQ(accepted({"watch", "bakes/3f", "--server", "s"}).job, "bakes/3f");
   EXPECT_EQ(accepted({"watch", "3f", "--server", "s"}).job, "bakes/3f");
+  EXPECT_EQ(accepted({"finish", "3f", "--server", "s"}).job, "bakes/3f");
+  EXPECT_EQ(accepted({"finish", "3f", "--server", "s"}).command, Command::kFinish);
 }
 
 TEST_F(Options, NeedsAServerForOtherPeoplesBakes) {
   const std::vector<std::vector<std::string>> commands = {
-      {"list"}, {"watch", "3f"}, {"cancel", "3f"}, {"download", "3f", "-o", "out"}};
+      {"list"}, {"watch", "3f"}, {"finish", "3f"}, {"cancel", "3f"}, {"download", "3f", "-o", "out"}};
   for (const auto& arguments : commands) {
     const EarlyExit exit = refused(arguments);
     EXPECT_EQ(exit.code, kUsage);
@@ -180,6 +182,16 @@ INSTANTIATE_TEST_SUITE_P(
         BadOption{{"--hdri", "dawn.hdr:0"}, "'0' as a scale"},
         BadOption{{"--hdri", "dawn.hdr", "--sky", "1,1,1"}, "--sky"},
         BadOption{{"--effect", "caustics=on"}, "'caustics' is none of emitters, point"},
+        BadOption{{"--max-error", "200%"}, "'200%' is neither a percentage"},
+        BadOption{{"--max-error", "-2%"}, "'-2%' is neither a percentage"},
+        BadOption{{"--time-budget", "soon"}, "'soon' is not a time"},
+        BadOption{{"--quality", "best"}, "'best' is none of draft"},
+        BadOption{{"--quality", "draft", "--max-error", "2%"}, "--max-error"},
+        BadOption{{"--rays", "64", "--max-error", "2%"}, "--max-error"},
+        BadOption{{"--rays", "64", "--time-budget", "2s"}, "--time-budget"},
+        BadOption{{"--max-error", "2%", "--output", "vertices"}, "--output vertices makes none"},
+        BadOption{{"--strict"}, "needs an error to reach: --max-error or --quality"},
+        BadOption{{"--strict", "--time-budget", "2s"}, "needs an error to reach"},
         BadOption{{"--layers", "glow"}, "'glow' is none of ao, direct, indirect"},
         BadOption{{"--layers", "ao", "--output", "vertices"}, "--output vertices makes none"},
         BadOption{{"--ao-distance", "2"}, "needs --layers ao"}, BadOption{{"--frobnicate"}, "--frobnicate"}));
@@ -207,6 +219,18 @@ TEST_F(Options, PlanTakesWhatDecidesABakeAndNoFolder) {
   EXPECT_EQ(refused({"plan", "scene.glb", "--deadline", "0"}).code, kUsage);
 }
 
+TEST_F(Options, TakesATargetABudgetAndStrictness) {
+  const CommandLine line = accepted(submit_with({"--max-error", "2%", "--time-budget", "1m", "--strict"}));
+  EXPECT_EQ(line.bake.max_error, 0.02);
+  EXPECT_EQ(line.bake.time_budget_ms, 60'000u);
+  EXPECT_TRUE(line.strict);
+  EXPECT_TRUE(accepted(submit_with({"--quality", "draft", "--strict"})).strict);
+  EXPECT_FALSE(accepted(submit_with({})).strict);
+  EXPECT_EQ(accepted({"plan", "scene.glb", "--quality", "draft", "--time-budget", "5s"}).bake.quality, "draft");
+  EXPECT_EQ(refused({"plan", "scene.glb", "--max-error", "2%", "--rays", "64"}).code, kUsage);
+  EXPECT_EQ(refused({"plan", "scene.glb", "--max-error", "2%", "--strict"}).code, kUsage);
+}
+
 TEST_F(Options, ADryRunNeedsNoFolder) {
   const CommandLine line = accepted({"submit", "scene.glb", "--dry-run"});
   EXPECT_TRUE(line.only_plans());
@@ -226,18 +250,19 @@ TEST_F(Options, TakesTheSceneOfADownload) {
 
 TEST_F(Options, SubmitNamesEveryFileThatItWrites) {
   const std::string help = refused({"submit", "--help"}).out;
-  for (const char* word : {"scene.glb", "lightmap_N.exr", "lightmap_N.png", "lightmaps.json", "report.json",
-                           "MOZ_lightmap", "_IRRADIANCE", "radbake_texel_density"}) {
+  for (const char* word : {"scene.glb", "lightmap_N.exr", "error_N.exr", "lightmap_N.png", "lightmaps.json",
+                           "report.json", "MOZ_lightmap", "_IRRADIANCE", "radbake_texel_density"}) {
     EXPECT_THAT(help, HasSubstr(word));
   }
 }
 
 TEST_F(Options, HelpsEverywhereWithExamples) {
-  for (const char* command : {"submit", "plan", "list", "watch", "cancel", "download", "capabilities"}) {
+  for (const char* command : {"submit", "plan", "list", "watch", "finish", "cancel", "download", "capabilities"}) {
     const EarlyExit exit = refused({command, "--help"});
     EXPECT_EQ(exit.code, kDone);
     EXPECT_THAT(exit.err, IsEmpty());
-    EXPECT_THAT(exit.out, AllOf(HasSubstr("Examples:\n  radbake "), HasSubstr("--server"), HasSubstr("Exit codes:")));
+    EXPECT_THAT(exit.out, AllOf(HasSubstr("Examples:\n  radbake "), HasSubstr("--server"), HasSubstr("Exit codes:"),
+                                HasSubstr("7 error asked for")));
   }
   EXPECT_THAT(refused({"--help"}).out, AllOf(HasSubstr("Examples:"), HasSubstr("submit"), HasSubstr("capabilities")));
 }

@@ -80,6 +80,28 @@ TEST(Report, HoldsWhatWasPredictedAmongWhatMayDiffer) {
   EXPECT_FALSE(report["plan"].contains("prediction"));
 }
 
+TEST(Report, HoldsTheErrorAndThePasses) {
+  v1::Bake bake = finished_bake();
+  EXPECT_FALSE(make_report(bake, {}, std::nullopt, {}).contains("error"));
+  v1::BakeReport& server = *bake.mutable_result()->mutable_report();
+  server.mutable_error()->set_relative_rmse(0.03);
+  server.add_passes()->set_rays_per_texel(64);
+  server.mutable_run()->add_passes()->set_seconds(0.25);
+  const auto report = make_report(bake, {}, std::nullopt, {});
+  EXPECT_EQ(report["error"]["relative_rmse"], 0.03);
+  EXPECT_TRUE(report["error"]["asked"].is_null());
+  EXPECT_EQ(report["passes"][0]["rays_per_texel"], 64);
+  EXPECT_FALSE(report["passes"][0].contains("seconds"));  // equal bakes have equal passes
+  EXPECT_EQ(report["run"]["passes"][0]["seconds"], 0.25);
+}
+
+TEST(Report, NamesNoPreviewWhereThereIsNone) {
+  v1::Layer layer;
+  const auto report = make_report(finished_bake(), {{layer, "error_0.exr", ""}}, std::nullopt, {});
+  EXPECT_EQ(report["layers"][0]["image"], "error_0.exr");
+  EXPECT_FALSE(report["layers"][0].contains("preview"));
+}
+
 TEST(Report, OfADownloadHasNoReadersPart) {
   const auto report = make_report(finished_bake(), {}, std::nullopt, {});
   EXPECT_FALSE(report["scene"].contains("num_triangles_dropped"));

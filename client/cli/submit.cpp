@@ -54,8 +54,8 @@ bool tell_error(const CommandContext& context, const v1::BakeReport& report) {
   const std::string line = report.has_error() ? reached_line(report.error()) : "the server tells no error";
   if (!is_reached) {
     context.reporter.warning({"error_not_reached", line});
-  } else if (context.interrupt.once().stop_requested()) {
-    context.reporter.warning({"ended_early", "ended early, with the best so far: " + line});
+  } else if (report.error().limited_by() == "stopped") {
+    context.reporter.warning({"ended_early", line});
   } else if (report.has_error()) {
     context.reporter.note(line);
   }

@@ -58,9 +58,6 @@ std::string find_target_contradiction(const BakeChoices& choices) {
   if (choices.rays > 0 && choices.time_budget_ms > 0) {
     return "--rays says how much is done, --time-budget how long it may take: give one of them";
   }
-  if (asked_error(choices) > 0 && choices.output == v1::OUTPUT_VERTICES) {
-    return target + " is an error of lightmaps, and --output vertices makes none";
-  }
   return "";
 }
 

@@ -132,10 +132,6 @@ std::optional<FieldProblem> find_target_problem(const v1::BakeSettings& settings
     return FieldProblem{error > 0 ? "settings.max_error" : "settings.time_budget_ms",
                         asked + " chooses the rays by itself: not with rays " + std::to_string(settings.rays())};
   }
-  if (error > 0 && settings.output() == v1::OUTPUT_VERTICES) {
-    return FieldProblem{"settings.max_error",
-                        std::to_string(error) + " is the error of a lightmap: not with OUTPUT_VERTICES"};
-  }
   return std::nullopt;
 }
 

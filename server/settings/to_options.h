@@ -24,8 +24,8 @@ struct FieldProblem {
 /// distance that is a length. Empty: nothing is wrong.
 std::optional<FieldProblem> find_effect_problem(const v1::BakeSettings& settings);
 
-/// Checks what a request says of the error to reach and of the time it may take: an error is a share of 1 that only a
-/// lightmap is held to, a time at most kMaxTimeBudgetMs, and both choose the rays themselves. Empty: nothing is wrong.
+/// Checks what a request says of the error to reach and of the time it may take: an error is a share of 1, a time at
+/// most kMaxTimeBudgetMs, and both choose the rays themselves. Empty: nothing is wrong.
 std::optional<FieldProblem> find_target_problem(const v1::BakeSettings& settings);
 
 inline constexpr std::uint64_t kMaxTimeBudgetMs = std::uint64_t{30} * 24 * 3600 * 1000;

@@ -21,8 +21,8 @@ CORNELL = SCENES / "cornell.glb"
 
 QUICK = ["--atlas-size", "64", "--rays", "16", "--max-patches", "300"]
 SMALL = ["--atlas-size", "64", "--max-patches", "300"]
-# Some seconds: for what is asked to finish before its end.
-STEADY = ["--atlas-size", "256", "--rays", "1024"]
+# Passes over it follow each other for as long: for what is asked to finish before its end.
+STEADY = ["--time-budget", "10m", *SMALL]
 # Minutes of work on any machine: for what is cancelled long before its end.
 LONG = ["--atlas-size", "2048", "--rays", "65536"]
 # For what must not hang; no test depends on how long anything takes.
@@ -84,7 +84,7 @@ class PrivateServer(CliTest):
         self.assert_exit(result, 0)
         lines = result.stdout.splitlines()
         self.assertRegex(lines[0], r"^bakes/\w+$")
-        names = ["lightmap_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json", "report.json"]
+        names = ["lightmap_0.exr", "lightmap_0.png", "error_0.exr", "scene.glb", "lightmaps.json", "report.json"]
         self.assertEqual(lines[1:], [str(self.place / "out" / name) for name in names])
         self.assertEqual(sorted(os.listdir(self.place / "out")), sorted(names))
         report = json.loads((self.place / "out" / "report.json").read_text())
@@ -117,7 +117,7 @@ class PrivateServer(CliTest):
         for name, threads in (("a", 1), ("b", 2), ("c", 2)):
             self.assert_exit(self.run_cli("submit", CORNELL, "-o", self.place / name, "--threads", threads, *QUICK), 0)
             images.append([(self.place / name / file).read_bytes()
-                           for file in ("lightmap_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json")])
+                           for file in ("lightmap_0.exr", "error_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json")])
             report = json.loads((self.place / name / "report.json").read_text())
             self.assertEqual(list(report)[-1], "run")
             del report["run"]
@@ -143,9 +143,10 @@ class PrivateServer(CliTest):
         out, err = process.communicate(timeout=LIMIT_SECONDS)
         self.assertEqual(process.returncode, 0, err)
         self.assertRegex(err, r"ending bakes/\w+ with the best so far \(Ctrl-C again: cancel\)")
-        self.assertIn("warning: ", err)
+        self.assertRegex(err, r"warning: error .* %\): the bake was asked to finish")
         self.assertIn("lightmap_0.exr", out)
-        self.assertIn("lightmap_0.exr", os.listdir(self.place / "out"))
+        report = json.loads((self.place / "out" / "report.json").read_text())
+        self.assertEqual((report["error"]["limited_by"], report["error"]["asked"]), ("stopped", None))
         self.assert_nothing_left("out")
 
     def test_a_second_ctrl_c_cancels_and_cleans_up(self):
@@ -163,6 +164,22 @@ class PrivateServer(CliTest):
         self.assertEqual(process.returncode, 6)
         self.assert_nothing_left()
 
+    def test_an_error_that_is_not_reached_is_a_warning_and_with_strict_an_exit_code(self):
+        # A thousandth of a second is over before there is a map.
+        hopeless = ["--max-error", "0.01%", "--time-budget", "1ms", *SMALL]
+        result = self.run_cli("submit", CORNELL, "-o", self.place / "out", *hopeless)
+        self.assert_exit(result, 0)
+        self.assertRegex(result.stderr, r"warning: .*asked 0.01 %, not reached: the time was up")
+        strict = self.run_cli("submit", CORNELL, "-o", self.place / "strict", "--strict", "--json", *hopeless)
+        self.assert_exit(strict, 7)
+        events = [json.loads(line) for line in strict.stdout.splitlines()]
+        self.assertIn("error_not_reached", [event["id"] for event in events if event["event"] == "warning"])
+        self.assertEqual(events[-1]["event"], "written")
+        self.assertEqual(sorted(os.listdir(self.place / "strict")), sorted(os.listdir(self.place / "out")))
+        reached = self.run_cli("submit", CORNELL, "-o", self.place / "good", "--strict", "--max-error", "50%", *SMALL)
+        self.assert_exit(reached, 0)
+        self.assertNotIn("warning", reached.stderr)
+
     def test_folder_that_is_not_empty_is_a_usage_error_unless_forced(self):
         (self.place / "out").mkdir()
         (self.place / "out" / "mine.txt").write_text("mine")
@@ -172,7 +189,8 @@ class PrivateServer(CliTest):
         self.assertEqual(os.listdir(self.place / "out"), ["mine.txt"])
         self.assert_exit(self.run_cli("submit", CORNELL, "-o", self.place / "out", "--force", *QUICK), 0)
         self.assertEqual(sorted(os.listdir(self.place / "out")),
-                         ["lightmap_0.exr", "lightmap_0.png", "lightmaps.json", "mine.txt", "report.json", "scene.glb"])
+                         ["error_0.exr", "lightmap_0.exr", "lightmap_0.png", "lightmaps.json", "mine.txt", "report.json",
+                          "scene.glb"])
 
     def test_a_missing_server_program_is_named(self):
         alone = self.place / "alone"
@@ -332,8 +350,8 @@ class Outputs(CliTest):
     def test_both_kinds_of_light_and_all_encodings(self):
         self.bake(CORNELL, "--output", "both", "--encoding", "png-rgbm,hdr,exr")
         self.assertEqual(sorted(os.listdir(self.folder)),
-                         ["lightmap_0.exr", "lightmap_0.hdr", "lightmap_0.png", "lightmap_0_rgbm.png", "lightmaps.json",
-                          "report.json", "scene.glb"])
+                         ["error_0.exr", "lightmap_0.exr", "lightmap_0.hdr", "lightmap_0.png", "lightmap_0_rgbm.png",
+                          "lightmaps.json", "report.json", "scene.glb"])
         self.assertEqual([f["encoding"] for f in self.sidecar["lightmaps"][0]["files"]], ["png-rgbm", "hdr", "exr"])
         self.assertTrue((self.folder / "lightmap_0.hdr").read_bytes().startswith(b"#?RADIANCE"))
         for entry in self.sidecar["meshes"]:
@@ -486,8 +504,8 @@ class Plans(CliTest):
         self.assertLess(min(texel[0] for texel in openness), 0.9)  # corners of the room
         sidecar = json.loads((self.place / "out" / "lightmaps.json").read_text())
         self.assertEqual([layer["name"] for layer in sidecar["lightmaps"][0]["layers"]],
-                         ["lightmap_0_direct", "lightmap_0_indirect", "lightmap_0_ao"])
-        self.assertEqual([layer["unit"] for layer in sidecar["lightmaps"][0]["layers"]], ["lx", "lx", "1"])
+                         ["lightmap_0_direct", "lightmap_0_indirect", "lightmap_0_ao", "error_0"])
+        self.assertEqual([layer["unit"] for layer in sidecar["lightmaps"][0]["layers"]], ["lx", "lx", "1", "lx"])
         # The scene carries all light and nothing else.
         gltf, _ = cli_scenes.glb_parts((self.place / "out" / "scene.glb").read_bytes())
         self.assertEqual(len(gltf["images"]), 1)
@@ -564,11 +582,12 @@ class SharedServer(CliTest):
 
         downloaded = self.run_cli("download", name.removeprefix("bakes/"), "-o", self.place / "again", "--json")
         self.assert_exit(downloaded, 0)
-        self.assertEqual(json.loads(downloaded.stdout)["files"], ["lightmap_0.exr", "lightmap_0.png", "report.json"])
+        self.assertEqual(json.loads(downloaded.stdout)["files"],
+                         ["lightmap_0.exr", "lightmap_0.png", "error_0.exr", "report.json"])
         self.assertIn("--scene", downloaded.stderr)
         with_scene = self.run_cli("download", name, "-o", self.place / "again", "--force", "--scene", CORNELL)
         self.assert_exit(with_scene, 0)
-        for file in ("lightmap_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json"):
+        for file in ("lightmap_0.exr", "error_0.exr", "lightmap_0.png", "scene.glb", "lightmaps.json"):
             self.assertEqual((self.place / "out" / file).read_bytes(), (self.place / "again" / file).read_bytes(), file)
 
         cancelled = self.run_cli("cancel", name, "--json")

@@ -189,7 +189,6 @@ INSTANTIATE_TEST_SUITE_P(
         BadOption{{"--quality", "draft", "--max-error", "2%"}, "--max-error"},
         BadOption{{"--rays", "64", "--max-error", "2%"}, "--max-error"},
         BadOption{{"--rays", "64", "--time-budget", "2s"}, "--time-budget"},
-        BadOption{{"--max-error", "2%", "--output", "vertices"}, "--output vertices makes none"},
         BadOption{{"--strict"}, "needs an error to reach: --max-error or --quality"},
         BadOption{{"--strict", "--time-budget", "2s"}, "needs an error to reach"},
         BadOption{{"--layers", "glow"}, "'glow' is none of ao, direct, indirect"},

@@ -316,21 +316,18 @@ TEST(Settings, NameTheEffectOrLayerThatIsWrong) {
 }
 
 TEST(Settings, NameTheTargetOrBudgetThatIsWrong) {
-  const auto problem = [](double max_error, std::uint64_t budget_ms, unsigned rays = 0,
-                          v1::Output output = v1::OUTPUT_LIGHTMAP) {
+  const auto problem = [](double max_error, std::uint64_t budget_ms, unsigned rays = 0) {
     v1::BakeSettings settings;
     settings.set_max_error(max_error);
     settings.set_time_budget_ms(budget_ms);
     settings.set_rays(rays);
-    settings.set_output(output);
     const auto found = settings::find_target_problem(settings);
     return found ? found->field + ": " + found->description : std::string();
   };
   using ::testing::StartsWith;
   EXPECT_EQ(problem(0, 0), "");
   EXPECT_EQ(problem(0.02, 1000), "");
-  EXPECT_EQ(problem(0.02, 0, 0, v1::OUTPUT_BOTH), "");
-  EXPECT_EQ(problem(0, settings::kMaxTimeBudgetMs, 0, v1::OUTPUT_VERTICES), "");
+  EXPECT_EQ(problem(0, settings::kMaxTimeBudgetMs), "");
   EXPECT_EQ(problem(0, 0, 64), "");
   EXPECT_EQ(problem(-0.5, 0), "settings.max_error: -0.500000 is not at least 0 and below 1");
   EXPECT_EQ(problem(1, 0), "settings.max_error: 1.000000 is not at least 0 and below 1");
@@ -342,7 +339,6 @@ TEST(Settings, NameTheTargetOrBudgetThatIsWrong) {
             "settings.max_error: max_error 0.020000 chooses the rays by itself: not with rays 64");
   EXPECT_EQ(problem(0, 1000, 64),
             "settings.time_budget_ms: time_budget_ms 1000 chooses the rays by itself: not with rays 64");
-  EXPECT_THAT(problem(0.02, 0, 0, v1::OUTPUT_VERTICES), StartsWith("settings.max_error: 0.020000 is the error of a"));
 }
 
 /// The words of the wire are those of the library: what is chosen by name on one side has that name on the other.

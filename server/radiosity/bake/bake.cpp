@@ -91,6 +91,13 @@ class Bake {
     }
   }
 
+  /// What row sums and solutions may be off by: well below what sampling leaves, where there are targets. What rows are
+  /// off by counts 1 / (1 - rho) times.
+  double tolerance() const {
+    constexpr double kSmall = 1e-3;
+    return is_progressive() ? kSmall * std::max(1 - prepared_.plan.survey.max_reflectance, 0.01) : 0;
+  }
+
   /// What filling, levelling and writing may take after the last pass, wall seconds.
   double seconds_to_complete() const {
     constexpr double kLeast = 0.03, kPerPixel = 0.3e-6;
@@ -152,7 +159,7 @@ class Bake {
     for (int r = 0; r < num; ++r) {
       const auto index = static_cast<std::uint64_t>(r);
       const SystemSettings own{seed_of(seed, kReplicate, index), settings.rays_per_row / num,
-                               settings.patch_light_samples / num};
+                               settings.patch_light_samples / num, tolerance()};
       const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
         progress_.report(BakeStage::kFormFactors, total * index + done, total * total_num);
       };

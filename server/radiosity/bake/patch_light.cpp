@@ -33,10 +33,12 @@ void keep_channel(int channel, RadiositySystem& system) {
 }
 
 /// System -> radiosity, with the report's solver and energy.
-Result<std::vector<Vec3>> solve_system(const BakePlan& plan, const RadiositySystem& system, bool is_of_one_channel,
+Result<std::vector<Vec3>> solve_system(const BakePlan& plan, const RadiositySystem& system, double tolerance,
+                                       bool is_of_one_channel,
                                        const std::function<void(std::uint64_t, double)>& on_step, std::stop_token stop,
                                        PatchLightReport& report) {
   SolveOptions options;
+  if (tolerance > 0) options.relative_tolerance = tolerance;
   options.max_sweeps = max_sweeps_of(plan.survey.max_reflectance, options.relative_tolerance);
   options.max_lu_patches = std::numeric_limits<std::size_t>::max();  // never chosen but by name
   std::vector<Vec3> radiosity = system.problem.source;
@@ -88,6 +90,7 @@ Result<ReplicateSystem> estimate_system(const Preparation& prepared, const Syste
                                         std::stop_token stop) {
   const int num_channels = prepared.num_ray_channels();
   ReplicateSystem replicate;
+  replicate.tolerance = settings.tolerance;
   for (int channel = 0; channel < num_channels; ++channel) {
     const auto of_all = [&](std::uint64_t done, std::uint64_t total) {
       on_row(total * static_cast<std::uint64_t>(channel) + done, total * static_cast<std::uint64_t>(num_channels));
@@ -111,8 +114,8 @@ Result<PatchLight> solve_patch_light(const Preparation& prepared, ReplicateSyste
     const auto system = std::move(replicate.of_channel[channel]);
     std::vector<Vec3> own;
     if (system->transport) {
-      RADBAKE_ASSIGN_OR_RETURN(own,
-                               solve_system(prepared.plan, *system, num_channels > 1, on_step, stop, replicate.report));
+      RADBAKE_ASSIGN_OR_RETURN(own, solve_system(prepared.plan, *system, replicate.tolerance, num_channels > 1, on_step,
+                                                 stop, replicate.report));
     } else {
       replicate.report.solver.solver = "none";
       replicate.report.solver.status = "converged";

@@ -31,6 +31,7 @@ struct PatchLightReport {
 
 /// One replicate of the system: a system for each channel that see-through surfaces tell apart, else one for all.
 struct ReplicateSystem {
+  double tolerance = 0;  ///< as SystemSettings has it
   std::vector<std::unique_ptr<RadiositySystem>> of_channel;
   PatchLightReport report;
 };

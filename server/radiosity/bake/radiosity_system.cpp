@@ -219,7 +219,8 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
     return system;
   }
   rows = {};
-  auto sparse = std::make_unique<SparseOperator>(estimated, stop);
+  auto sparse = std::make_unique<SparseOperator>(estimated, stop,
+                                                 settings.tolerance > 0 ? settings.tolerance : SparseOperator::kExact);
   estimated = {};
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   summarise(sparse->repair(), system->summary);

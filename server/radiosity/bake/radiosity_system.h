@@ -38,6 +38,8 @@ struct SystemSettings {
   std::uint64_t seed = 0;
   int rays_per_row = 0;
   int light_samples = 0;  ///< shadow rays to emitters, a patch
+  /// How far off row sums and the solution may be left, relative; 0: as little as can be.
+  double tolerance = 0;
 };
 
 /// The estimator of a plan's rows, as a channel of what is see-through meets the scene.

@@ -209,11 +209,18 @@ std::vector<std::uint8_t> light_levels(const LightmapGather& gather, int mean_sa
   const double most = std::log2(std::max(1.0, static_cast<double>(most_samples) / kReplicates));
   std::vector<std::uint8_t> levels(facts.size(),
                                    static_cast<std::uint8_t>(std::lround(std::log2(std::max(1.0, each)))));
-  for (std::size_t i = 0; i < facts.size() && mean > 0; ++i) {
-    if (facts[i].state == TexelState::kValid) {
-      const double wanted = each * deviations[i] / mean;
+  // Levels are whole numbers, none below 0: the factor that makes their mean right is found by trying.
+  double factor = 1;
+  constexpr int kTries = 4;
+  for (int attempt = 0; attempt < kTries && mean > 0; ++attempt) {
+    double total = 0;
+    for (std::size_t i = 0; i < facts.size(); ++i) {
+      if (facts[i].state != TexelState::kValid) continue;
+      const double wanted = factor * each * deviations[i] / mean;
       levels[i] = static_cast<std::uint8_t>(std::lround(std::clamp(std::log2(std::max(wanted, 1.0)), 0.0, most)));
+      total += std::exp2(levels[i]);
     }
+    factor *= each * static_cast<double>(num) / total;
   }
   return levels;
 }

@@ -10,7 +10,6 @@ namespace {
 
 constexpr std::size_t kRowsPerTask = 256;
 /// Scaling ends when every row sum is right to this, or has stopped getting better.
-constexpr double kRowSumTolerance = 1e-14;
 constexpr int kMaxScalingSweeps = 500;
 
 template <typename Body>
@@ -54,9 +53,10 @@ void merge_row_and_column(const EstimatedRows& rows, const Transposed& columns, 
 
 }  // namespace
 
-SparseOperator::SparseOperator(const EstimatedRows& rows, const std::stop_token& stop) : areas_(rows.areas) {
+SparseOperator::SparseOperator(const EstimatedRows& rows, const std::stop_token& stop, double tolerance)
+    : areas_(rows.areas) {
   pair_estimates(rows, stop);
-  if (!stop.stop_requested()) restore_row_sums(rows, stop);
+  if (!stop.stop_requested()) restore_row_sums(rows, stop, tolerance);
 }
 
 void SparseOperator::pair_estimates(const EstimatedRows& rows, const std::stop_token& stop) {
@@ -107,7 +107,7 @@ double SparseOperator::scaled_row(std::uint32_t i) const {
   return sum * scale_[i];
 }
 
-void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop) {
+void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop, double tolerance) {
   const std::size_t n = rows.size();
   scale_.assign(n, 1);
   std::vector<double> target(n, 0), sums(n, 0);
@@ -141,7 +141,7 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop
   double worst = measure(true), best = worst;
   int sweeps_since_best = 0;
   constexpr int kPatience = 20;
-  while (worst > kRowSumTolerance && repair_.scaling_sweeps < kMaxScalingSweeps && sweeps_since_best < kPatience &&
+  while (worst > tolerance && repair_.scaling_sweeps < kMaxScalingSweeps && sweeps_since_best < kPatience &&
          !stop.stop_requested()) {
     for (std::size_t i = 0; i < n; ++i) {
       if (target[i] > 0 && sums[i] > 0) scale_[i] *= std::sqrt(target[i] / sums[i]);

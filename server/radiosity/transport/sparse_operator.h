@@ -34,8 +34,11 @@ struct TransportRepair {
 /// Source: Knight, Ruiz & Ucar 2014 (symmetric scaling); van Leersum 1989 (why row sums and reciprocity both matter).
 class SparseOperator final : public TransportOperator {
  public:
-  /// Stopped early, the operator means nothing.
-  explicit SparseOperator(const EstimatedRows& rows, const std::stop_token& stop = {});
+  /// Row sums that are off by rounding only; sweeps end there.
+  static constexpr double kExact = 1e-14;
+
+  /// `tolerance`: how far off row sums may be left, as a share. Stopped early, the operator means nothing.
+  explicit SparseOperator(const EstimatedRows& rows, const std::stop_token& stop = {}, double tolerance = kExact);
 
   const TransportRepair& repair() const { return repair_; }
 
@@ -58,7 +61,7 @@ class SparseOperator final : public TransportOperator {
 
  private:
   void pair_estimates(const EstimatedRows& rows, const std::stop_token& stop);
-  void restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop);
+  void restore_row_sums(const EstimatedRows& rows, const std::stop_token& stop, double tolerance);
   double scaled_row(std::uint32_t i) const;
   template <Channels C>
   C gathered(std::uint32_t i, std::span<const C> radiosity) const;

@@ -1,10 +1,14 @@
 #include "server/study/commands.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "client/image/write_image.h"
 #include "server/settings/to_options.h"
+#include "server/study/accuracy_report.h"
+#include "server/study/accuracy_study.h"
 #include "server/study/bake_study.h"
 #include "server/study/cases.h"
 #include "server/study/convergence_study.h"
@@ -112,6 +116,58 @@ ExitCode run_bake(const SceneChoices& choices) {
   std::cout << bake_table(*bake);
   const auto written = write_lightmaps(bake->outcome, choices.folder);
   return written.ok() ? kDone : fail(written.error(), kNotWritten);
+}
+
+namespace {
+
+/// A file, or two bakes.
+Result<AccuracyReference> find_reference(const AccuracyChoices& choices, const Scene& scene,
+                                         const radiosity::BakeOptions& base) {
+  if (choices.reference.empty()) {
+    ReferenceEffort effort;
+    if (choices.reference_rays > 0) {
+      effort.light_samples = std::max(4, choices.reference_rays * effort.light_samples / effort.rays);
+      effort.rays = choices.reference_rays;
+    }
+    std::cerr << "radbake-study: baking the reference\n";
+    return make_reference(scene, base, effort);
+  }
+  AccuracyReference reference;
+  RADBAKE_ASSIGN_OR_RETURN(reference.map, image::read_exr(choices.reference));
+  const auto channels = static_cast<std::size_t>(reference.map.channels);
+  for (std::size_t k = 0; k < reference.map.values.size(); ++k) {
+    if (k % channels < 3) reference.map.values[k] *= static_cast<float>(choices.reference_scale);
+  }
+  reference.error = choices.reference_error;
+  reference.origin = "`" + std::filesystem::path(choices.reference).filename().string() + "`";
+  reference.is_ours = false;
+  return reference;
+}
+
+}  // namespace
+
+ExitCode run_accuracy(const AccuracyChoices& choices) {
+  const auto scene = read_scene(choices.scene);
+  if (!scene.ok()) return fail(scene.error(), kBadInput);
+  // Before the minutes that follow.
+  const std::string& folder = choices.scene.folder;
+  if (const auto made = make_folder(folder); !made.ok()) return fail(made.error(), kNotWritten);
+  const AccuracySweep sweep = default_sweep(bake_options(choices.scene));
+  auto reference = find_reference(choices, *scene, sweep.base);
+  if (!reference.ok()) {
+    return fail(reference.error(), reference.error().code == ErrorCode::kInvalidArgument ? kBadInput : kFailed);
+  }
+  const auto on_bake = [](std::size_t done, std::size_t total, const std::string& what) {
+    std::cerr << "radbake-study: " << done + 1 << " of " << total << ": " << what << '\n';
+  };
+  auto study = study_accuracy(*scene, sweep, std::move(*reference), on_bake);
+  if (!study.ok()) return fail(study.error(), kBadInput);
+  study->scene = std::filesystem::path(choices.scene.scene).filename().string();
+  const std::string page = accuracy_page(*study, "accuracy.png");
+  std::cout << page;
+  const auto written = write_text(std::filesystem::path(folder) / "accuracy.md", page);
+  if (!written.ok()) return fail(written.error(), kNotWritten);
+  return write_study(folder, "accuracy", accuracy_csv(*study), accuracy_plot(*study));
 }
 
 }  // namespace radbake::study

@@ -34,11 +34,21 @@ struct SceneChoices {
   options::BakeChoices bake;
 };
 
+/// What `accuracy` measures against.
+struct AccuracyChoices {
+  SceneChoices scene;
+  std::string reference;  ///< EXR; empty: baked
+  double reference_scale = 1;
+  double reference_error = 0;  ///< relative RMSE of the file
+  int reference_rays = 0;      ///< of the baked one; 0: as ReferenceEffort has it
+};
+
 /// Each runs a command, prints its table on stdout and its errors on stderr.
 ExitCode run_form_factors(const CaseChoices& choices);
 ExitCode run_enclosures(const CaseChoices& choices);
 ExitCode run_rates(const std::string& cases, const std::string& folder);
 ExitCode run_convergence(const SceneChoices& choices);
 ExitCode run_bake(const SceneChoices& choices);
+ExitCode run_accuracy(const AccuracyChoices& choices);
 
 }  // namespace radbake::study

@@ -9,6 +9,7 @@
 
 namespace {
 
+using radbake::study::AccuracyChoices;
 using radbake::study::CaseChoices;
 using radbake::study::SceneChoices;
 
@@ -88,6 +89,38 @@ CLI::App* add_bake(CLI::App& app, SceneChoices& choices) {
   return sub;
 }
 
+CLI::App* add_accuracy(CLI::App& app, AccuracyChoices& choices) {
+  CLI::App* sub =
+      app.add_subcommand("accuracy", "What accuracy costs: bakes by some forty settings, against a reference");
+  sub->add_option("SCENE", choices.scene.scene, "A .glb or .gltf file")->required();
+  add_folder(*sub, choices.scene.folder, "accuracy.md, accuracy.csv, accuracy.svg and accuracy.png");
+  CLI::Option* reference =
+      sub->add_option("--reference", choices.reference,
+                      "EXR to measure against; default: two dense bakes with form factors of near pairs by formula")
+          ->type_name("FILE");
+  sub->add_option("--reference-scale", choices.reference_scale, "Factor on it: 3.14159265359 for irradiance / pi")
+      ->check(check_positive, "")
+      ->needs(reference)
+      ->type_name("S");
+  sub->add_option("--reference-error", choices.reference_error, "Its own relative error, as a fraction")
+      ->check(check_positive, "")
+      ->needs(reference)
+      ->type_name("E");
+  sub->add_option("--reference-rays", choices.reference_rays,
+                  "Rays of each texel of the reference that is baked; light samples in proportion; default: 8192")
+      ->check(CLI::Range(64, 65536))
+      ->excludes(reference)
+      ->type_name("N");
+  radbake::options::add_bake_options(*sub, choices.scene.bake);
+  sub->footer(
+      "\nRays, patches, light samples, spacing, form factors, solvers and targets are what is swept: options that set "
+      "them\nchange the progressive bakes at most.\n"
+      "\nExamples:\n  radbake-study accuracy tests/scenes/cornell.glb -o accuracy --atlas-size 256\n"
+      "  radbake-study accuracy tests/scenes/cornell.glb -o accuracy --atlas-size 256 --reference-error 0.003 "
+      "--reference-scale 3.14159265359 --reference tests/golden/cornell_ref.exr\n");
+  return sub;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -102,6 +135,8 @@ int main(int argc, char** argv) {
   const CLI::App* for_enclosures = add_enclosures(app, enclosures);
   const CLI::App* for_rates = add_rates(app, rates, rates_folder);
   const CLI::App* for_convergence = add_convergence(app, convergence);
+  AccuracyChoices accuracy;
+  const CLI::App* for_accuracy = add_accuracy(app, accuracy);
   add_bake(app, bake);
   try {
     app.parse(argc, argv);
@@ -112,5 +147,6 @@ int main(int argc, char** argv) {
   if (for_enclosures->parsed()) return run_enclosures(enclosures);
   if (for_rates->parsed()) return run_rates(rates.cases, rates_folder);
   if (for_convergence->parsed()) return run_convergence(convergence);
+  if (for_accuracy->parsed()) return run_accuracy(accuracy);
   return run_bake(bake);
 }

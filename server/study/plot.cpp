@@ -5,9 +5,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "server/study/cases.h"
@@ -38,15 +41,38 @@ std::string number(double value) {
 
 /// How curve k of a panel is drawn. Colours that differ for the colour-blind: Okabe & Ito 2008.
 std::string style_of(const Curve& curve, int k) {
-  static const char* const kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                         "#e69f00", "#56b4e9", "#000000", "#7f7f7f"};
-  static const int kMarks[] = {7, 5, 9, 11, 13, 4, 6, 8};
+  static const char* const kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
+                                         "#56b4e9", "#000000", "#7f7f7f", "#882255", "#8c564b"};
+  static const int kMarks[] = {7, 5, 9, 11, 13, 4, 6, 8, 7, 13};
+  constexpr int kNumStyles = 10;
   if (curve.is_reference)
     return std::string("with lines lw 1.2 lc rgb '#555555' dt ") + (k % 2 == 0 ? "(12,5)" : "(3,4)");
-  const std::string colour = std::string(" lw 1.6 lc rgb '") + kColours[k % 8] + "'";
+  const std::string colour = std::string(" lw 1.6 lc rgb '") + kColours[k % kNumStyles] + "'";
   const std::string dashes = curve.is_dashed ? " dt (10,5)" : "";
   if (!curve.has_points) return "with lines" + colour + dashes;
-  return "with linespoints pt " + std::to_string(kMarks[k % 8]) + " ps 0.6" + colour + dashes;
+  if (!curve.has_line) return "with points pt " + std::to_string(kMarks[k % kNumStyles]) + " ps 0.9" + colour;
+  return "with linespoints pt " + std::to_string(kMarks[k % kNumStyles]) + " ps 0.6" + colour + dashes;
+}
+
+/// Tics at 1, 2 and 5 of each decade, and a range that ends just beyond the points. `axis`: 0 or 1.
+std::string close_axis(const Panel& panel, std::size_t axis) {
+  double low = std::numeric_limits<double>::max(), high = 0;
+  for (const Curve& curve : panel.curves) {
+    for (const auto& point : curve.points) {
+      if (!(point[0] > 0) || !(point[1] > 0)) continue;
+      low = std::min(low, point[axis]);
+      high = std::max(high, point[axis]);
+    }
+  }
+  if (!(high > 0)) return "";
+  const std::string name = axis == 0 ? "x" : "y";
+  std::string tics;
+  for (double decade = std::pow(10.0, std::floor(std::log10(low))); decade <= high; decade *= 10) {
+    for (const double step : {1.0, 2.0, 5.0}) tics += (tics.empty() ? "" : ", ") + number(step * decade);
+  }
+  constexpr double kMargin = 1.2;
+  return "set format " + name + " '%g'\nset " + name + "tics (" + tics + ")\nset " + name + "range [" +
+         number(low / kMargin) + ":" + number(high * kMargin) + "]\n";
 }
 
 std::string panel_script(const Panel& panel, int index, int num_panels) {
@@ -66,6 +92,7 @@ std::string panel_script(const Panel& panel, int index, int num_panels) {
       panel.is_x_logarithmic ? "set logscale x 10\nset format x '10^{%T}'\n" : "unset logscale x\nset format x '%g'\n";
   text += "set yrange [" + (panel.smallest_y > 0 ? number(panel.smallest_y) : std::string("*")) + ":*]\n";
   text += "set xrange [*:" + (panel.largest_x > 0 ? number(panel.largest_x) : std::string("*")) + "]\n";
+  if (panel.has_close_tics) text += close_axis(panel, 0) + close_axis(panel, 1);
   // Long legends are set in two columns.
   const std::size_t rows = panel.curves.size() > kLegendRows ? (panel.curves.size() + 1) / 2 : panel.curves.size();
   text += "set key maxrows " + std::to_string(rows) + "\n";

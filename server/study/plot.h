@@ -15,6 +15,7 @@ struct Curve {
   std::vector<std::array<double, 2>> points;  ///< x, y; those not above 0 are left out, as axes are logarithmic
   bool is_reference = false;                  ///< thin and dashed, without points
   bool has_points = true;
+  bool has_line = true;
   bool is_dashed = false;
 };
 
@@ -23,8 +24,9 @@ struct Panel {
   std::string title, x_label, y_label;
   std::vector<Curve> curves;
   bool is_x_logarithmic = true;
-  double smallest_y = 0;  ///< lower end of the axis; 0: as the curves need
-  double largest_x = 0;   ///< right end of the axis; 0: as the curves need
+  double smallest_y = 0;        ///< lower end of the axis; 0: as the curves need
+  double largest_x = 0;         ///< right end of the axis; 0: as the curves need
+  bool has_close_tics = false;  ///< 1, 2, 5 of each decade, and axes no longer than the curves: of two decades or so
 };
 
 /// Panels side by side.

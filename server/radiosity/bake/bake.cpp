@@ -1,5 +1,7 @@
 #include "server/radiosity/bake/bake.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -49,15 +51,10 @@ class Bake {
     report.num_patches = prepared_.patches.size();
     report.instruction_set = prepared_.visibility->instruction_set();
 
-    if (!is_progressive()) {
-      RADBAKE_RETURN_IF_ERROR(run_pass(prepared_.plan.first_pass, 1));
-    } else {
-      // A first pass is a third of a bake, or so: nobody knows before it has told its error.
-      constexpr double kFirstShare = 0.3;
-      RADBAKE_RETURN_IF_ERROR(run_pass(prepared_.plan.first_pass, kFirstShare));
-      results_.direct_effort = results_.gathered_effort = 1;
-      results_.last_direct_scale = results_.last_gathered_scale = 1;
+    if (is_progressive()) {
       RADBAKE_RETURN_IF_ERROR(refine());
+    } else {
+      RADBAKE_RETURN_IF_ERROR(run_pass(prepared_.plan.first_pass, {}, 1));
     }
     complete();
     report.stages = progress_.stage_times();
@@ -65,30 +62,80 @@ class Bake {
   }
 
  private:
-  bool is_progressive() const { return options_.max_error > 0 || options_.time_budget_seconds > 0; }
+  bool is_progressive() const { return asks_for_result(options_); }
 
   /// Passes until the target holds or the time is up.
   Result<void> refine() {
+    // A first pass is a third of a bake, or so: nobody knows before it has told its error.
+    constexpr double kFirstShare = 0.3;
+    const std::vector<PassScale>& replay = options_.replay;
+    const PassScale first = replay.empty() ? first_scale() : replay.front();
+    RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(first), first, kFirstShare));
     for (;;) {
       results_.seconds_left =
           options_.time_budget_seconds > 0
               ? std::max(0.0, options_.time_budget_seconds - progress_.seconds() - seconds_to_complete())
               : -1;
-      NoPass no_pass;
-      const auto next = plan_next_pass(results_, options_.max_error, no_pass);
-      outcome_.report.error.limited_by = no_pass.limited_by;
-      if (!next) return {};
-      if (finish_.stop_requested()) {
-        outcome_.report.error.limited_by = "stopped";
+      results_.can_refine_patches = 2 * prepared_.patches.size() <= max_refined_patches();
+      NextPass next;
+      if (!replay.empty()) {
+        const auto index = static_cast<std::size_t>(results_.num_passes);
+        if (index == replay.size()) return {};
+        next.scale = replay[index];
+        next.share_of_rest = 1 / static_cast<double>(replay.size() - index);
+      } else {
+        NoPass no_pass;
+        const auto planned = plan_next_pass(results_, options_.max_error, no_pass);
+        outcome_.report.error.limited_by = no_pass.limited_by;
+        if (!planned) return {};
+        next = *planned;
+        outcome_.report.error.predicted = next.predicted_error;
+      }
+      if (!finish_.stop_requested()) {
+        RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(next.scale), next.scale, next.share_of_rest));
+      }
+      if (finish_.stop_requested() || has_ended_early_) {
+        outcome_.report.error.limited_by = finish_.stop_requested() ? "stopped" : "time";
         return {};
       }
-      outcome_.report.error.predicted = next->predicted_error;
-      RADBAKE_RETURN_IF_ERROR(run_pass(next->settings, next->share_of_rest));
-      results_.direct_effort += next->direct_scale;
-      results_.gathered_effort += next->gathered_scale;
-      results_.last_direct_scale = next->direct_scale;
-      results_.last_gathered_scale = next->gathered_scale;
     }
+  }
+
+  /// Whether what was not begun is left out: somebody asked for what there is, or the time is up.
+  bool is_over() const {
+    return finish_.stop_requested() || (options_.time_budget_seconds > 0 &&
+                                        progress_.seconds() > options_.time_budget_seconds - seconds_to_complete());
+  }
+
+  /// Smaller than 1 where the first pass might take most of the time budget.
+  PassScale first_scale() const {
+    if (!(options_.time_budget_seconds > 0)) return {};
+    constexpr double kRaySeconds = 0.4e-6;  // a usual host's, with all that belongs to a ray
+    constexpr double kMostOfBudget = 0.4, kLeastScale = 0.25;
+    const PassSettings one = pass_of({});
+    const double rays = static_cast<double>(prepared_.patches.size()) * (one.rays_per_row + one.patch_light_samples) +
+                        static_cast<double>(prepared_.plan.num_texels + prepared_.plan.num_vertex_groups) *
+                            (one.rays_per_texel + one.light_samples);
+    const double seconds = rays * kRaySeconds / std::max(1, tbb::this_task_arena::max_concurrency());
+    const double left = options_.time_budget_seconds - progress_.seconds();
+    const double scale = std::clamp(kMostOfBudget * left / seconds, kLeastScale, 1.0);
+    return {scale, scale};
+  }
+
+  std::size_t max_refined_patches() const {
+    return static_cast<std::size_t>(options_.max_patches > 0 ? options_.max_patches : kDefaultMaxRefinedPatches);
+  }
+
+  /// Patches half as long a side, and nothing gathered from the larger ones.
+  void refine_patches() {
+    prepared_.patch_edge /= 2;
+    prepared_.patches =
+        make_patches(surfaces_, *prepared_.visibility, {prepared_.patch_edge, max_refined_patches(), stop_});
+    twice_as_large_.clear();
+    outcome_.report.num_patches = prepared_.patches.size();
+    if (lightmaps_) lightmaps_->forget_gathered();
+    if (vertices_) vertices_->forget_gathered();
+    results_.gathered_effort = results_.gathered_rays = 0;
   }
 
   /// What row sums and solutions may be off by: well below what sampling leaves, where there are targets. What rows are
@@ -105,7 +152,9 @@ class Bake {
   }
 
   /// The light of the patches, and the light that arrives from them.
-  Result<void> run_pass(const PassSettings& settings, double share_of_rest) {
+  Result<void> run_pass(const PassSettings& settings, const PassScale& scale, double share_of_rest) {
+    if (scale.refines_patches) refine_patches();
+    if (stop_.stop_requested()) return cancelled();
     const int index = results_.num_passes;
     const double began = progress_.seconds();
     const std::uint64_t seed =
@@ -117,11 +166,19 @@ class Bake {
 
     PassSummary summary;
     summary.num_patches = prepared_.patches.size();
+    summary.scale = scale;
     summary.rays_per_row = settings.rays_per_row;
     summary.rays_per_texel = settings.rays_per_texel;
     summary.light_samples_per_texel = settings.light_samples;
-    RADBAKE_ASSIGN_OR_RETURN(const std::vector<PatchLight> light, solve_replicates(settings, seed, summary));
-    if (!gather(settings, seed, light, summary)) return cancelled();
+    auto light = solve_replicates(settings, seed, summary);
+    if (!light.ok() && light.error().code == ErrorCode::kCancelled && index > 0 && !stop_.stop_requested()) {
+      // The time was up before the pass had changed anything.
+      has_ended_early_ = true;
+      return {};
+    }
+    if (!light.ok()) return light.error();
+    if (!gather(settings, seed, *light, summary)) return cancelled();
+    has_ended_early_ = !summary.is_whole;
 
     const LightError error = current_error();
     results_.error = error.relative_rmse;
@@ -130,6 +187,10 @@ class Bake {
     results_.discretisation = error.discretisation;
     results_.algebraic = error.algebraic;
     ++results_.num_passes;
+    results_.direct_effort += scale.direct;
+    results_.gathered_effort += scale.gathered;
+    results_.last_direct_scale = scale.direct;
+    results_.last_gathered_scale = scale.gathered;
     results_.last_seconds = progress_.seconds() - began;
     summary.relative_rmse = error.relative_rmse;
     summary.interval_low = error.low;
@@ -152,6 +213,12 @@ class Bake {
   /// The replicates of the patches' light: several where rows are sampled.
   Result<std::vector<PatchLight>> solve_replicates(const PassSettings& settings, std::uint64_t seed,
                                                    PassSummary& summary) {
+    // Later passes may be given up while nothing of them shows.
+    const bool is_first = results_.num_passes == 0;
+    std::stop_source end;
+    const std::stop_callback on_stop(stop_, [&] { end.request_stop(); });
+    const std::stop_callback on_finish(is_first ? std::stop_token{} : finish_, [&] { end.request_stop(); });
+    const std::stop_token stop = end.get_token();
     BakeReport& report = outcome_.report;
     const int num = num_replicates_of(report.plan.form_factors);
     const auto total_num = static_cast<std::uint64_t>(num);
@@ -162,8 +229,9 @@ class Bake {
                                settings.patch_light_samples / num, tolerance()};
       const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
         progress_.report(BakeStage::kFormFactors, total * index + done, total * total_num);
+        if (!is_first && is_over()) end.request_stop();
       };
-      RADBAKE_ASSIGN_OR_RETURN(ReplicateSystem system, estimate_system(prepared_, own, on_row, stop_));
+      RADBAKE_ASSIGN_OR_RETURN(ReplicateSystem system, estimate_system(prepared_, own, on_row, stop));
       summary.num_row_rays += system.report.num_row_rays;
       summary.num_light_rays += system.report.num_light_rays;
       systems.push_back(std::move(system));
@@ -175,7 +243,7 @@ class Bake {
     };
     std::vector<PatchLight> light;
     for (ReplicateSystem& system : systems) {
-      RADBAKE_ASSIGN_OR_RETURN(PatchLight own, solve_patch_light(prepared_, system, on_step, stop_));
+      RADBAKE_ASSIGN_OR_RETURN(PatchLight own, solve_patch_light(prepared_, system, on_step, stop));
       own.coarser = averaged(own.radiosity);
       light.push_back(std::move(own));
     }
@@ -254,14 +322,14 @@ class Bake {
       const Atlas& atlas = *prepared_.atlas;
       const GatherPass pass{alone, nodes, settings.light_samples, levels, settings.gathered_weight};
       const int index = results_.num_passes;
-      lightmaps_->add_pass(
+      summary.is_whole = lightmaps_->add_pass(
           pass,
           [&](const GatheredTile& tile) {
             progress_.tile({tile.sheet, index, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba,
                             lightmap_name(tile.sheet), atlas.width(), atlas.height()});
             progress_.report(BakeStage::kGathering, tile.texels_done, num_receivers);
           },
-          stop_, index > 0 ? finish_ : std::stop_token{}, counts);
+          stop_, [&] { return index > 0 && is_over(); }, counts);
     }
     if (vertices_) {
       vertices_->add_pass(
@@ -352,6 +420,7 @@ class Bake {
   std::optional<LightmapGather> lightmaps_;
   std::optional<VertexGather> vertices_;
   std::vector<std::uint32_t> twice_as_large_;  ///< [patches]
+  bool has_ended_early_ = false;
   PassResults results_;
   BakeOutcome outcome_;
 };
@@ -364,9 +433,9 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
     const ProgressMeter::Start start;
     observer.on_progress({});
     RADBAKE_ASSIGN_OR_RETURN(const std::unique_ptr<Preparation> prepared, prepare_scene(scene, options, stop));
-    const bool is_progressive = options.max_error > 0 || options.time_budget_seconds > 0;
     Prediction prediction;
-    if (!is_progressive) prediction = predict_bake(*prepared, process_cpu_seconds() - start.cpu_seconds, stop);
+    if (!asks_for_result(options))
+      prediction = predict_bake(*prepared, process_cpu_seconds() - start.cpu_seconds, stop);
     ProgressMeter progress(observer, start, options.max_error);
     auto outcome = Bake(scene, *prepared, progress, stop, finish).run();
     if (!outcome.ok()) return outcome;

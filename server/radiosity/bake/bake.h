@@ -118,6 +118,8 @@ struct PassSummary {
   int rays_per_row = 0, rays_per_texel = 0, light_samples_per_texel = 0;
   std::uint64_t num_gathered = 0, num_row_rays = 0, num_gather_rays = 0, num_light_rays = 0;
   double relative_rmse = 0, interval_low = 0, interval_high = 0;
+  PassScale scale;
+  bool is_whole = true;  ///< every texel has it: else the bake was asked to finish meanwhile, and cannot be replayed
   double seconds = 0, cpu_seconds = 0;  ///< since the bake began; may differ between equal bakes
 };
 

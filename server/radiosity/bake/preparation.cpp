@@ -102,8 +102,8 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   const double texel_edge = 1 / (reached_density * surfaces.metres_per_unit);
   if (!surfaces.effects.has(Effect::kOcclusion)) prepared->unblocked = make_unblocked(*prepared->visibility);
   probe_escape(surfaces, *prepared->visibility, prepared->surveyed.survey);
-  prepared->patches =
-      make_patches(surfaces, *prepared->visibility, {patch_edge(texel_edge, area, max_patches), max_patches, stop});
+  prepared->patch_edge = patch_edge(texel_edge, area, max_patches);
+  prepared->patches = make_patches(surfaces, *prepared->visibility, {prepared->patch_edge, max_patches, stop});
   if (stop.stop_requested()) return cancelled;
 
   BakePlan& plan = prepared->plan;
@@ -122,9 +122,9 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   plan.rays_per_row = std::max(plan.rays_per_texel, kMinRays * num_replicates_of(FormFactors::kHemisphere));
   plan.light_samples_per_texel =
       std::count(surfaces.is_emitter.begin(), surfaces.is_emitter.end(), 1) > 0 ? kLightSamplesPerTexel : 0;
-  if (options.max_error > 0 || options.time_budget_seconds > 0) {
+  if (asks_for_result(options)) {
     plan.spacing = options.spacing > 0 ? options.spacing : kProgressiveSpacing;
-    plan.first_pass = pass_of(1, 1);
+    plan.first_pass = pass_of({});
     plan.rays_per_row = plan.first_pass.rays_per_row;
     plan.rays_per_texel = plan.first_pass.rays_per_texel;
   } else {

@@ -25,6 +25,7 @@ struct Preparation {
   std::optional<Atlas> atlas;             ///< where lightmaps are wanted
   std::optional<VertexGroups> groups;     ///< where light by vertex is wanted
   Patches patches;
+  double patch_edge = 0;  ///< wanted length of a patch's side, scene units
   BakePlan plan;
 
   /// 3 where a tinted sheet stops channels by different shares: each then has rows of its own.

@@ -146,16 +146,19 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   return true;
 }
 
-void LightmapGather::gather_nodes(const GatherPass& pass, std::stop_token stop, std::vector<NodeLight>& nodes,
-                                  GatherCounts& counts) {
-  if (roles_.num_nodes() == 0) return;
+bool LightmapGather::gather_nodes(const GatherPass& pass, std::stop_token stop, const std::function<bool()>& is_over,
+                                  std::vector<NodeLight>& nodes, GatherCounts& counts) {
+  if (roles_.num_nodes() == 0) return true;
   nodes.assign(roles_.num_nodes(), {});
   const auto rows = roles_.num_nodes() / static_cast<std::size_t>(roles_.nodes_across());
   const SobolPoints points(pass.nodes.rows.num_sites() / pass.nodes.rows.replicates());
   std::vector<GatherCounts> of_row(rows);
+  std::vector<std::uint8_t> is_left_out(rows, 0);
   for_each_range(rows, 1, [&](std::size_t begin, std::size_t end) {
     Scratch scratch;
     for (std::size_t j = begin; j < end; ++j) {
+      is_left_out[j] = is_over && is_over();
+      if (is_left_out[j]) continue;
       scratch.counts = {};
       for (int i = 0; i < roles_.nodes_across(); ++i) {
         if (stop.stop_requested()) return;
@@ -168,6 +171,7 @@ void LightmapGather::gather_nodes(const GatherPass& pass, std::stop_token stop, 
     }
   });
   for (const GatherCounts& row : of_row) counts += row;
+  return std::find(is_left_out.begin(), is_left_out.end(), 1) == is_left_out.end();
 }
 
 void LightmapGather::judge_squares(const std::vector<NodeLight>& nodes) {
@@ -280,7 +284,7 @@ void LightmapGather::gather_between(const GatherPass& pass, const std::vector<No
 }
 
 bool LightmapGather::add_pass(const GatherPass& pass, const std::function<void(const GatheredTile&)>& on_tile,
-                              std::stop_token stop, std::stop_token finish, GatherCounts& counts) {
+                              std::stop_token stop, const std::function<bool()>& is_over, GatherCounts& counts) {
   const int width = atlas_.width(), height = atlas_.height();
   const int edge = std::max(width, height) > kLargeAtlas ? 2 * kTileEdge : kTileEdge;
   const int tiles_across = (width + edge - 1) / edge, tiles_down = (height + edge - 1) / edge;
@@ -288,8 +292,7 @@ bool LightmapGather::add_pass(const GatherPass& pass, const std::function<void(c
 
   estimate_.begin_pass(pass.weight);
   std::vector<NodeLight> nodes;
-  gather_nodes(pass, stop, nodes, counts);
-  if (stop.stop_requested()) return false;
+  if (!gather_nodes(pass, stop, is_over, nodes, counts) || stop.stop_requested()) return false;
   judge_squares(nodes);
 
   const auto num_tiles = static_cast<std::size_t>(tiles_across) * tiles_down * atlas_.num_sheets();
@@ -365,7 +368,7 @@ bool LightmapGather::add_pass(const GatherPass& pass, const std::function<void(c
   for_each_range(num_tiles, 1, [&](std::size_t begin, std::size_t end) {
     Scratch scratch;
     for (std::size_t index = begin; index < end; ++index) {
-      is_left_out[index] = finish.stop_requested();
+      is_left_out[index] = is_over && is_over();
       if (!is_left_out[index]) gather_tile(index, scratch);
     }
   });

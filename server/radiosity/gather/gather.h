@@ -59,10 +59,17 @@ class LightmapGather {
 
   /// Final gather of one pass: receive() over the footprint of each texel, or, of plain squares, over the footprints of
   /// their nodes and direct light everywhere. A buried texel is invalid. Tiles are reported as they finish, one call at
-  /// a time, in any order; the map does not depend on that order. Stopped, the estimate means nothing; asked to finish,
-  /// tiles that were not begun keep what earlier passes found: false then.
+  /// a time, in any order; the map does not depend on that order. Stopped, the estimate means nothing. Once `is_over`,
+  /// asked from any thread, says so, what was not begun keeps what earlier passes found: false then, and no other pass
+  /// may follow.
   bool add_pass(const GatherPass& pass, const std::function<void(const GatheredTile&)>& on_tile, std::stop_token stop,
-                std::stop_token finish, GatherCounts& counts);
+                const std::function<bool()>& is_over, GatherCounts& counts);
+
+  /// What passes so far gathered from patches does not count any more; direct light does.
+  void forget_gathered() {
+    estimate_.forget_gathered();
+    total_weight_ = 0;
+  }
 
   const Atlas& atlas() const { return atlas_; }
   const LightEstimate& estimate() const { return estimate_; }
@@ -86,7 +93,9 @@ class LightmapGather {
   struct NodeLight;
   struct Scratch;
 
-  void gather_nodes(const GatherPass& pass, std::stop_token stop, std::vector<NodeLight>& nodes, GatherCounts& counts);
+  /// False where it ended early.
+  bool gather_nodes(const GatherPass& pass, std::stop_token stop, const std::function<bool()>& is_over,
+                    std::vector<NodeLight>& nodes, GatherCounts& counts);
   void judge_squares(const std::vector<NodeLight>& nodes);
   double interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const;
   void place_sites(const GatherScene& scene, const SobolPoints& points, int x, int y, Scratch& scratch) const;

@@ -21,6 +21,9 @@ class VertexGather {
   void add_pass(const GatherScene& scene, int light_samples, double weight,
                 const std::function<void(std::uint64_t)>& on_done, std::stop_token stop, GatherCounts& counts);
 
+  /// As LightmapGather::forget_gathered().
+  void forget_gathered() { estimate_.forget_gathered(); }
+
   const LightEstimate& estimate() const { return estimate_; }
   /// [groups] Whether a group is not buried.
   const std::vector<std::uint8_t>& is_known() const { return is_known_; }

@@ -48,6 +48,8 @@ class LightEstimate {
   void begin_pass(double gathered_weight) { pass_weight_ = gathered_weight; }
   void add(std::size_t receiver, const PassLight& light, double direct_weight);
   void end_pass() { gathered_weight_ += pass_weight_; }
+  /// What passes so far gathered does not count any more.
+  void forget_gathered() { gathered_weight_ = 0; }
 
   Vec3 direct(std::size_t i) const { return at(direct_, i); }
   Vec3 gathered(std::size_t i) const { return at(gathered_, i); }

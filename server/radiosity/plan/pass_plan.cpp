@@ -29,16 +29,16 @@ int whole(double wanted, double least, double multiple) {
 
 }  // namespace
 
-PassSettings pass_of(double gathered_scale, double direct_scale) {
+PassSettings pass_of(const PassScale& scale) {
   // Each replicate of a row has enough rays to tell what is buried.
   constexpr double kLeastRays = 8 * kReplicates;
   PassSettings pass;
-  pass.rays_per_row = whole(kRaysPerRow * gathered_scale, kLeastRays, kReplicates);
-  pass.patch_light_samples = whole(kPatchLightSamples * gathered_scale, 4 * kReplicates, 4 * kReplicates);
-  pass.rays_per_texel = whole(kRaysPerTexel * gathered_scale, kLeastRays, kReplicates);
-  pass.rays_per_node = whole(kRaysPerNode * gathered_scale, kLeastRays, kReplicates);
-  pass.light_samples = whole(kLightSamples * direct_scale, kReplicates, kReplicates);
-  pass.gathered_weight = gathered_scale;
+  pass.rays_per_row = whole(kRaysPerRow * scale.gathered, kLeastRays, kReplicates);
+  pass.patch_light_samples = whole(kPatchLightSamples * scale.gathered, 4 * kReplicates, 4 * kReplicates);
+  pass.rays_per_texel = whole(kRaysPerTexel * scale.gathered, kLeastRays, kReplicates);
+  pass.rays_per_node = whole(kRaysPerNode * scale.gathered, kLeastRays, kReplicates);
+  pass.light_samples = whole(kLightSamples * scale.direct, kReplicates, kReplicates);
+  pass.gathered_weight = scale.gathered;
   return pass;
 }
 
@@ -47,9 +47,13 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
   const bool has_budget = results.seconds_left >= 0;
   no_pass.limited_by.clear();
   if (max_error > 0 && results.error <= kDone * max_error) return std::nullopt;
-  const double fixed = squared(results.discretisation) + squared(results.algebraic);
   const double direct = squared(results.direct_sampling), gathered = squared(results.gathered_sampling);
-  if (results.num_passes >= kMostPasses || direct + gathered == 0) {
+  // Halved, patches are off by half as much, or less.
+  const double discretisation = squared(results.discretisation);
+  const double leads = max_error > 0 ? squared(kAim * max_error) / 2 : direct + gathered;
+  const bool refines = results.can_refine_patches && discretisation > leads;
+  const double fixed = discretisation / (refines ? 4 : 1) + squared(results.algebraic);
+  if (results.num_passes >= kMostPasses || (direct + gathered == 0 && !refines)) {
     no_pass.limited_by = direct + gathered == 0 ? "discretisation" : "passes";
     return std::nullopt;
   }
@@ -60,7 +64,7 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
     allowed = squared(kAim * max_error) - fixed;
     const double floor = fixed / 16;
     if (allowed < floor) {
-      if (direct + gathered <= 2 * floor) {
+      if (!refines && direct + gathered <= 2 * floor) {
         no_pass.limited_by = "discretisation";
         return std::nullopt;
       }
@@ -76,17 +80,18 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
   const double direct_part = direct * results.direct_effort, gathered_part = gathered * results.gathered_effort;
   const double root = std::sqrt(direct_part * direct_cost) + std::sqrt(gathered_part * gathered_cost);
   double direct_effort = direct_cost > 0 ? std::sqrt(direct_part / direct_cost) * root / allowed : 0;
+  const double gathered_kept = refines ? 0 : results.gathered_effort;
   double gathered_effort = gathered_cost > 0 ? std::sqrt(gathered_part / gathered_cost) * root / allowed : 0;
   // Where one part has more than it needs, the other reaches the target alone.
   if (direct_effort < results.direct_effort && allowed > direct) {
     direct_effort = results.direct_effort;
     gathered_effort = gathered_part / (allowed - direct);
-  } else if (gathered_effort < results.gathered_effort && allowed > gathered) {
+  } else if (!refines && gathered_effort < results.gathered_effort && allowed > gathered) {
     gathered_effort = results.gathered_effort;
     direct_effort = direct_part / (allowed - gathered);
   }
   const double direct_rest = std::max(0.0, direct_effort - results.direct_effort);
-  const double gathered_rest = std::max(0.0, gathered_effort - results.gathered_effort);
+  const double gathered_rest = std::max(0.0, gathered_effort - gathered_kept);
   const double rest = direct_rest * direct_cost + gathered_rest * gathered_cost;
 
   // This pass's share of it.
@@ -108,11 +113,9 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
         1.0, share * rest / std::max(last_cost, 1e-300) * results.last_seconds / std::max(results.seconds_left, 1e-9));
   }
   NextPass next;
-  next.gathered_scale = std::max(share * gathered_rest, 0.25);
-  next.direct_scale = std::max(share * direct_rest, 0.25);
-  next.settings = pass_of(next.gathered_scale, next.direct_scale);
-  const double direct_after = direct_part / (results.direct_effort + next.direct_scale);
-  const double gathered_after = gathered_part / (results.gathered_effort + next.gathered_scale);
+  next.scale = {std::max(share * gathered_rest, 0.25), std::max(share * direct_rest, 0.25), refines};
+  const double direct_after = direct_part / (results.direct_effort + next.scale.direct);
+  const double gathered_after = gathered_part / (gathered_kept + next.scale.gathered);
   next.predicted_error = std::sqrt(direct_after + gathered_after + fixed);
   next.share_of_rest = has_budget ? seconds_share : share;
   return next;

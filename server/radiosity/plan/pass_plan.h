@@ -18,6 +18,15 @@ struct PassSettings {
   bool operator==(const PassSettings&) const = default;
 };
 
+/// How large a pass is against the first of its kind; enough to run it again.
+struct PassScale {
+  double gathered = 1, direct = 1;
+  /// Patches half as long a side as before; gathered light starts anew, what earlier passes gathered is dropped.
+  bool refines_patches = false;
+
+  bool operator==(const PassScale&) const = default;
+};
+
 /// Where the error stands after a pass, as shares of the mean irradiance, and what it took.
 struct PassResults {
   double error = 0;  ///< estimated relative RMSE, all parts
@@ -28,14 +37,14 @@ struct PassResults {
   double last_direct_scale = 0, last_gathered_scale = 0;
   double last_seconds = 0;   ///< wall, of the last pass
   double seconds_left = -1;  ///< of a time budget; negative: there is none
+  bool can_refine_patches = false;
 };
 
 /// A pass of a scale: 1 is the first pass, the coarsest that tells its own error.
-PassSettings pass_of(double gathered_scale, double direct_scale);
+PassSettings pass_of(const PassScale& scale);
 
 struct NextPass {
-  PassSettings settings;
-  double gathered_scale = 0, direct_scale = 0;
+  PassScale scale;
   double predicted_error = 0;
   /// Of the work that is left to reach the target (or to fill the budget), this pass's share.
   double share_of_rest = 1;
@@ -49,8 +58,9 @@ struct NoPass {
 /// The next pass towards a target, as cheap as the errors so far say: sampling errors fall with the square root of the
 /// effort, and the direct and the gathered part get what buys the most (the least cost c_d N_d + c_g N_g at which
 /// S_d / N_d + S_g / N_g is what the other errors leave of the target). It aims at 0.8 x the target and is done at 0.9.
-/// Within a budget, passes double until the last one fills what is left. Time decides only how large a pass is and
-/// whether there is one. `no_pass` says why there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
+/// Where the patches' size leads the error and may be refined, the pass does. Within a budget, passes double until the
+/// last one fills what is left. Time decides only how large a pass is and whether there is one. `no_pass` says why
+/// there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
 std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass);
 
 }  // namespace radbake::radiosity

@@ -32,7 +32,7 @@ Result<void> check_options(const BakeOptions& options) {
   RADBAKE_RETURN_IF_ERROR(check_range("spacing", options.spacing, 1, 8));
   RADBAKE_RETURN_IF_ERROR(check_range("largest error", options.max_error, 1e-6, 1.0));
   RADBAKE_RETURN_IF_ERROR(check_range("time budget", options.time_budget_seconds, 1e-6, 1e9));
-  if (options.rays > 0 && (options.max_error > 0 || options.time_budget_seconds > 0)) {
+  if (options.rays > 0 && asks_for_result(options)) {
     return invalid_argument("rays ask for a setting, a largest error or a time budget for a result: ask for one");
   }
   RADBAKE_RETURN_IF_ERROR(check_range("threads", options.threads, 1, 4096));

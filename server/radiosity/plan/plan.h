@@ -55,7 +55,9 @@ struct BakeOptions {
   int threads = 0;                                                      ///< 0: all cores; changes no result
   double max_error = 0;            ///< relative RMSE to reach, as a fraction; 0: none asked
   double time_budget_seconds = 0;  ///< from the start of the bake to the last tile; 0: none
-  HostCosts costs = {};            ///< as earlier bakes measured them; changes no result
+  /// Exactly these passes, as a report told them, in the place of those that an error or a time asks for.
+  std::vector<PassScale> replay = {};
+  HostCosts costs = {};  ///< as earlier bakes measured them; changes no result
 };
 
 /// What a bake will do. Field for field radbake.v1.Plan.
@@ -93,6 +95,8 @@ inline constexpr int kMinRays = 8;
 inline constexpr int kMaxRays = 65536;
 inline constexpr int kDefaultMaxPatches = 16384;
 inline constexpr int kMinMaxPatches = 64;
+/// Bound on patches that passes refine, where none is asked for.
+inline constexpr int kDefaultMaxRefinedPatches = 65536;
 /// By formula every pair of patches has its price.
 inline constexpr int kDefaultMaxPatchesByFormula = 1024;
 inline constexpr std::uint64_t kDefaultTransportMemory = std::uint64_t{4} << 30;
@@ -102,6 +106,11 @@ inline constexpr int kLightSamplesPerTexel = 128;
 inline constexpr int kLightSamplesPerPatch = 64;
 /// Texels from one that gathers indirect light to the next, where a bake is asked by error or by time.
 inline constexpr int kProgressiveSpacing = 4;
+
+/// Whether a bake is asked by error or by time, or to repeat one that was: it is made in passes.
+inline bool asks_for_result(const BakeOptions& options) {
+  return options.max_error > 0 || options.time_budget_seconds > 0 || !options.replay.empty();
+}
 
 /// Errors: kInvalidArgument naming the option and the value. Zero is always right: it means choose.
 Result<void> check_options(const BakeOptions& options);

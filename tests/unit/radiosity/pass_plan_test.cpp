@@ -25,8 +25,8 @@ PassResults after_first_pass() {
 
 /// What a pass of so much more makes of it, as the plan's model has it.
 void advance(const NextPass& next, PassResults& results) {
-  const double direct = results.direct_effort / (results.direct_effort + next.direct_scale);
-  const double gathered = results.gathered_effort / (results.gathered_effort + next.gathered_scale);
+  const double direct = results.direct_effort / (results.direct_effort + next.scale.direct);
+  const double gathered = results.gathered_effort / (results.gathered_effort + next.scale.gathered);
   results.direct_rays /= direct;
   results.gathered_rays /= gathered;
   results.direct_effort /= direct;
@@ -35,8 +35,8 @@ void advance(const NextPass& next, PassResults& results) {
   results.gathered_sampling *= std::sqrt(gathered);
   results.error = std::hypot(results.direct_sampling, results.gathered_sampling, results.discretisation);
   ++results.num_passes;
-  results.last_direct_scale = next.direct_scale;
-  results.last_gathered_scale = next.gathered_scale;
+  results.last_direct_scale = next.scale.direct;
+  results.last_gathered_scale = next.scale.gathered;
 }
 
 TEST(PassPlan, HasNoOtherPassWhereTheFirstIsGoodEnough) {
@@ -78,7 +78,7 @@ TEST(PassPlan, SpendsMoreWhereThereIsMoreToGain) {
   NoPass no_pass;
   const auto next = plan_next_pass(results, 0.02, no_pass);
   ASSERT_TRUE(next);
-  EXPECT_GT(next->direct_scale, 4 * next->gathered_scale);
+  EXPECT_GT(next->scale.direct, 4 * next->scale.gathered);
 }
 
 TEST(PassPlan, EndsAtTheDiscretisationThatNoPassRemoves) {
@@ -93,6 +93,20 @@ TEST(PassPlan, EndsAtTheDiscretisationThatNoPassRemoves) {
   EXPECT_EQ(no_pass.limited_by, "discretisation");
 }
 
+TEST(PassPlan, RefinesPatchesWhereTheirSizeLeads) {
+  PassResults results = after_first_pass();
+  results.discretisation = 0.03;
+  results.can_refine_patches = true;
+  NoPass no_pass;
+  const auto next = plan_next_pass(results, 0.02, no_pass);
+  ASSERT_TRUE(next);
+  EXPECT_TRUE(next->scale.refines_patches);
+  results.discretisation = 0.005;
+  const auto other = plan_next_pass(results, 0.02, no_pass);
+  ASSERT_TRUE(other);
+  EXPECT_FALSE(other->scale.refines_patches);
+}
+
 TEST(PassPlan, FillsABudgetAndNoMore) {
   PassResults results = after_first_pass();
   constexpr double kBudget = 5;
@@ -104,8 +118,8 @@ TEST(PassPlan, FillsABudgetAndNoMore) {
                         results.direct_rays / results.direct_effort * results.last_direct_scale;
     const auto next = plan_next_pass(results, 0, no_pass);
     if (!next) break;
-    const double own = 2 * results.gathered_rays / results.gathered_effort * next->gathered_scale +
-                       results.direct_rays / results.direct_effort * next->direct_scale;
+    const double own = 2 * results.gathered_rays / results.gathered_effort * next->scale.gathered +
+                       results.direct_rays / results.direct_effort * next->scale.direct;
     results.last_seconds *= own / cost;
     spent += results.last_seconds;
     advance(*next, results);
@@ -126,7 +140,7 @@ TEST(PassPlan, EndsAtOnceWhereNoTimeIsLeft) {
 
 TEST(PassPlan, GivesEachReplicateWholeShares) {
   for (const double scale : {0.25, 1.0, 1.3, 7.7, 300.0, 5000.0}) {
-    const PassSettings pass = pass_of(scale, scale);
+    const PassSettings pass = pass_of({scale, scale});
     for (const int rays : {pass.rays_per_row, pass.rays_per_texel, pass.rays_per_node, pass.light_samples}) {
       EXPECT_EQ(rays % 4, 0) << scale;
       EXPECT_GE(rays, 4) << scale;

@@ -139,13 +139,18 @@ double relative_rmse(const std::vector<Vec3>& values, const std::vector<Vec3>& e
   return std::sqrt(squares / n) / (sum / n);
 }
 
-Result<void> run(const std::string& name, const Scene& scene, int atlas_size, int most_texels, int runs) {
+struct Options {
+  int atlas_size = 256, most_texels = 4000, runs = 3;
+  std::vector<int> samples = {4, 16, 64};
+};
+
+Result<void> run(const std::string& name, const Scene& scene, const Options& asked) {
   BakeOptions options;
-  options.atlas_size = atlas_size;
+  options.atlas_size = asked.atlas_size;
   RADBAKE_ASSIGN_OR_RETURN(const auto prepared, prepare_scene(scene, options, {}));
   const Surfaces& surfaces = prepared->surveyed.surfaces;
   const Embree embree(surfaces.corners);
-  const Receivers receivers(*prepared, most_texels);
+  const Receivers receivers(*prepared, asked.most_texels);
   const auto num_emitters = std::count(surfaces.is_emitter.begin(), surfaces.is_emitter.end(), 1);
   std::printf("%s: %zu triangles, %td of them emitters, %zu lamps; %zu texels\n", name.c_str(), surfaces.size(),
               num_emitters, surfaces.lights.size(), receivers.size());
@@ -154,7 +159,7 @@ Result<void> run(const std::string& name, const Scene& scene, int atlas_size, in
   const auto of_all = Environment::Part::kBright;
   const DirectLight reference(surfaces, visibility, kReferenceSamples, of_all);
   const std::vector<Vec3> exact = estimates(reference, receivers.sites(kReferenceSites, 1), 1, 1);
-  for (const int samples : {4, 16, 64}) {
+  for (const int samples : asked.samples) {
     const auto sites = receivers.sites(std::min(samples, kReferenceSites), 7);
     const DirectLight direct(surfaces, visibility, samples, of_all);
     const double whole = relative_rmse(estimates(direct, sites, 3, 1), exact);
@@ -164,7 +169,7 @@ Result<void> run(const std::string& name, const Scene& scene, int atlas_size, in
     std::uint64_t rays = 0;
     estimates(DirectLight(surfaces, recorder, samples, of_all), sites, 3, kReplicates, &rays);
     double alone = 1e9, ours = 1e9;
-    for (int k = 0; k < runs; ++k) {
+    for (int k = 0; k < asked.runs; ++k) {
       alone = std::min(alone, embree.shadow_seconds(recorder.shadow));
       ours = std::min(ours, seconds_of([&] { estimates(direct, sites, 3, kReplicates); }));
     }
@@ -179,12 +184,12 @@ Result<void> run(const std::string& name, const Scene& scene, int atlas_size, in
   return {};
 }
 
-Result<void> run_file(const std::string& path, int atlas_size, int most_texels, int runs) {
+Result<void> run_file(const std::string& path, const Options& asked) {
   const auto grey = [](std::span<const std::byte>, const std::string&, bool) -> Result<TexturePlane> {
     return TexturePlane{.name = "grey", .width = 1, .height = 1, .values = {0.5f, 0.5f, 0.5f}};
   };
   RADBAKE_ASSIGN_OR_RETURN(const gltf::GltfScene read, gltf::read_gltf(path, grey, {}));
-  return run(path, read.scene, atlas_size, most_texels, runs);
+  return run(path, read.scene, asked);
 }
 
 }  // namespace
@@ -194,24 +199,27 @@ int main(int argc, char** argv) {
   using namespace radbake;
   CLI::App app("Measures direct light: time a shadow ray, share of Embree's rate, error by number of samples");
   std::vector<std::string> files;
-  int atlas_size = 256, most_texels = 4000, runs = 3;
+  radiosity::Options asked;
+  bool is_files_only = false;
   app.add_option("SCENE", files, "glTF files, before the rooms built in; textures count as grey");
-  app.add_option("--atlas-size", atlas_size)->capture_default_str();
-  app.add_option("--texels", most_texels, "at most about that many are measured")->capture_default_str();
-  app.add_option("--runs", runs)->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--atlas-size", asked.atlas_size)->capture_default_str();
+  app.add_option("--texels", asked.most_texels, "at most about that many are measured")->capture_default_str();
+  app.add_option("--runs", asked.runs)->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--samples", asked.samples, "of a texel, multiples of 4")->capture_default_str();
+  app.add_flag("--files-only", is_files_only, "leave out the rooms built in");
   CLI11_PARSE(app, argc, argv);
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   std::vector<Result<void>> results;
-  for (const std::string& file : files) {
-    results.push_back(radiosity::run_file(file, atlas_size, most_texels, runs));
-  }
-  for (const tests::EffectRoom& room : tests::rooms_with_effects()) {
-    if (room.name == "emitters" || room.name == "sun" || room.name == "hdri" || room.name == "all") {
-      results.push_back(radiosity::run("effect room " + room.name, room.scene, atlas_size, most_texels, runs));
+  for (const std::string& file : files) results.push_back(radiosity::run_file(file, asked));
+  if (!is_files_only) {
+    for (const tests::EffectRoom& room : tests::rooms_with_effects()) {
+      if (room.name == "emitters" || room.name == "sun" || room.name == "hdri" || room.name == "all") {
+        results.push_back(radiosity::run("effect room " + room.name, room.scene, asked));
+      }
     }
+    results.push_back(radiosity::run("flat", radiosity::flat(), asked));
+    results.push_back(radiosity::run("hall of lights", radiosity::hall_of_lights(), asked));
   }
-  results.push_back(radiosity::run("flat", radiosity::flat(), atlas_size, most_texels, runs));
-  results.push_back(radiosity::run("hall of lights", radiosity::hall_of_lights(), atlas_size, most_texels, runs));
   for (const Result<void>& result : results) {
     if (result.ok()) continue;
     std::fprintf(stderr, "bench_direct_light: %s\n", result.error().message.c_str());

@@ -5,8 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "common/base/sequence.h"
+#include "server/radiosity/lights/emitter_tree.h"
+#include "server/radiosity/lights/emitters.h"
 #include "server/radiosity/lights/environment.h"
+#include "server/radiosity/lights/light_columns.h"
+#include "server/radiosity/lights/light_points.h"
 #include "server/radiosity/survey/site.h"
 #include "server/radiosity/visibility/visibility.h"
 
@@ -14,8 +17,9 @@ namespace radbake::radiosity {
 
 /// Light that arrives straight from small bright surfaces and lamps: the part of H^direct that rows leave out.
 ///
-/// Surfaces: each sample chooses an emitter triangle by its likely share at the receiver, and a point on it, uniform in
-/// solid angle where it is near or large, else in area:
+/// Surfaces: each sample chooses an emitter (a triangle, or a rectangle of two) by its likely share at the receiver,
+/// and a point on it, uniform in solid angle where it is near, else in area with a density bilinear in what its corners
+/// are likely to bring:
 ///
 ///   H = E/pi cos(theta) Omega V            H = E/pi cos(theta) cos(theta') A / r^2 V
 ///
@@ -25,7 +29,8 @@ namespace radbake::radiosity {
 /// About an interpolated normal, the part of the cosine lobe under the surface, (1 - n.g)/2, is taken out and the rest
 /// scaled up, as the hemisphere rows do.
 /// Units:  lx; intensities in cd, distances turned to metres.
-/// Source: Shirley, Wang & Zimmerman 1996; Arvo 1995 (spherical triangles); KHR_lights_punctual (falloff of spots).
+/// Source: Shirley, Wang & Zimmerman 1996; Arvo 1995 (spherical triangles); Urena, Fajardo & King 2013 (spherical
+/// rectangles); Hart et al. 2020 (bilinear warps); KHR_lights_punctual (falloff of spots).
 class DirectLight {
  public:
   /// `part`: of a sky of every direction. A receiver that looks its dim part up along rays that escape asks for the
@@ -34,22 +39,28 @@ class DirectLight {
               Environment::Part part = Environment::Part::kAll);
 
   /// Whether there is anything to sample.
-  bool is_dark() const { return emitters_.empty() && surfaces_.lights.empty() && !has_sampled_environment(); }
+  bool is_dark() const { return emitters_.empty() && lamps_.empty() && suns_.empty() && !has_sampled_environment(); }
   int samples() const { return points_.size(); }
   /// Null: there is none.
   const Environment* environment() const { return environment_ ? &*environment_ : nullptr; }
 
+  /// Buffers that one thread reuses from receiver to receiver.
   struct Scratch {
-    std::vector<Ray> segments;
-    std::vector<Vec3> contributions;
-    std::vector<std::uint32_t> replicate_of;
+    std::vector<std::uint32_t> open;  ///< sites that count
+    ReceiverColumns receiver;
+    SeenEmitters seen;
+    SampleColumns samples;
+    std::vector<double> cumulative;  ///< [emitters] importance
+    EmitterTree::Cut cut;
+    SegmentBuffer segments;
     std::vector<std::uint8_t> blocked;
     std::vector<Vec3> transmitted;
-    std::vector<double> cumulative;
   };
 
   /// Estimates irradiance as independent replicates, each with its share of the samples; their mean is the estimate.
-  /// Shapes: sites [n], is_buried [n] (buried sites are left out), replicates [r].
+  /// Shapes: sites [n], is_buried [n] (buried sites are left out), replicates [r]. Replicate k has its own samples from
+  /// its own run of the sites that are left, k n / r up to (k + 1) n / r; fewer than r sites are shared by all.
+  /// Replicates are independent where the sites of their runs are.
   /// `samples`: of all replicates, a multiple of r and at most samples(); 0: samples().
   /// Returns the number of shadow rays.
   std::uint64_t estimate(std::span<const Site> sites, std::span<const std::uint8_t> is_buried, std::uint64_t seed,
@@ -59,30 +70,43 @@ class DirectLight {
   double emitted_lumens() const;
 
  private:
-  struct Emitter {
-    std::uint32_t triangle;
-    Vec3 centroid;
-    double power;  ///< area times exitance, largest of the channels
+  /// A point or spot light.
+  struct Lamp {
+    Vec3 position;   ///< scene units
+    Vec3 intensity;  ///< cd
+    Vec3 axis;
+    bool is_spot = false;
+    double outer_cosine = 0, per_ramp = 0;  ///< of a spot
+    double falloff(double cosine) const;
   };
 
-  /// Mean exitance of an emitter with its holes.
+  /// Mean exitance of an emitter triangle with its holes.
   Vec3 sent_by(std::uint32_t triangle) const;
-  void sample_emitters(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
-                       std::size_t num_replicates, std::size_t num_samples) const;
-  void sample_lamps(const std::vector<const Site*>& sites, Scratch& scratch, std::size_t num_replicates) const;
-  void sample_sun(const DirectionalLight& sun, const std::vector<const Site*>& sites, std::uint64_t seed,
-                  Scratch& scratch, std::size_t num_replicates, std::size_t num_samples) const;
-  void sample_environment(const std::vector<const Site*>& sites, std::uint64_t seed, Scratch& scratch,
-                          std::size_t num_replicates, std::size_t num_samples) const;
   bool has_sampled_environment() const { return environment_ && !environment_->is_empty(); }
+
+  void sample_emitters(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, std::size_t num_replicates,
+                       std::size_t samples) const;
+  /// Draws the emitters of all samples. False: none of them sends anything to the receiver.
+  bool choose_emitters(Scratch& scratch, std::size_t num_samples, std::size_t samples) const;
+  /// Places samples anew whose emitter is near: uniform over its solid angle.
+  void place_near(std::span<const Site> sites, Scratch& scratch, std::size_t num_samples) const;
+  void sample_lamps(std::span<const Site> sites, Scratch& scratch, std::size_t num_replicates,
+                    std::size_t samples) const;
+  void sample_sun(const DirectionalLight& sun, std::span<const Site> sites, std::uint64_t seed, Scratch& scratch,
+                  std::size_t num_replicates, std::size_t samples) const;
+  void sample_environment(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, std::size_t num_replicates,
+                          std::size_t samples) const;
   /// A ray into the open that brings `contribution` where nothing blocks it.
   void add_ray(const Site& site, Vec3 direction, Vec3 contribution, std::size_t replicate, Scratch& scratch) const;
 
   const Surfaces& surfaces_;
   const Visibility& visibility_;
-  SobolPoints points_;
+  LightPoints points_;
   std::vector<Emitter> emitters_;
-  std::vector<double> cumulative_power_;
+  EmitterColumns columns_;
+  EmitterTree tree_;
+  std::vector<Lamp> lamps_;
+  std::vector<DirectionalLight> suns_;  ///< with a disc or without
   std::optional<Environment> environment_;
 };
 

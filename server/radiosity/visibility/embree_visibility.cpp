@@ -323,7 +323,9 @@ class EmbreeVisibility final : public Visibility {
   };
 
   PacketContext make_context(std::span<const Ray> batch, Vec3* transmitted) const {
-    PacketContext context{{}, tree_.get(), channel_, Chances(batch), {}, {}, transmitted};
+    // Nobody asks for chances where all is opaque.
+    const Chances chances(is_see_through() ? batch : std::span<const Ray>{});
+    PacketContext context{{}, tree_.get(), channel_, chances, {}, {}, transmitted};
     rtcInitIntersectContext(&context.base);
     return context;
   }

@@ -41,11 +41,13 @@ Json prediction_table(const v1::RunReport& run) {
 }
 
 std::string prediction_line(const v1::RunReport& run) {
-  if (!run.has_prediction()) return "";
+  const std::string took = "took " + duration(run.cpu_seconds()) + " of CPU time",
+                    memory = bytes(run.peak_memory_bytes());
+  if (!run.has_prediction()) return took + " and " + memory + " of memory";
   const v1::StagePrediction& predicted = run.prediction().total();
-  return "took " + duration(run.cpu_seconds()) + " of CPU time, predicted " + duration(predicted.cpu_seconds()) + " (" +
-         duration(predicted.cpu_seconds_low()) + " to " + duration(predicted.cpu_seconds_high()) + "), and " +
-         bytes(run.peak_memory_bytes()) + " of memory, predicted " + bytes(predicted.memory_bytes());
+  return took + ", predicted " + duration(predicted.cpu_seconds()) + " (" + duration(predicted.cpu_seconds_low()) +
+         " to " + duration(predicted.cpu_seconds_high()) + "), and " + memory + " of memory, predicted " +
+         bytes(predicted.memory_bytes());
 }
 
 }  // namespace radbake::cli

@@ -16,7 +16,7 @@ namespace radbake::cli {
 /// Precondition: run.has_prediction().
 nlohmann::ordered_json prediction_table(const v1::RunReport& run);
 
-/// The totals of the same in one line; empty without a prediction.
+/// The totals of the same in one line; without a prediction what the bake took.
 std::string prediction_line(const v1::RunReport& run);
 
 }  // namespace radbake::cli

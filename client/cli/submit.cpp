@@ -114,8 +114,7 @@ ExitCode run_submit(const CommandContext& context) {
   const Result<void> written = write_results(session->client, {*bake, report, scene, line.files}, *folder, stages,
                                              context.reporter, context.interrupt.twice());
   if (!written.ok()) return fail(context, session->explain(written.error()));
-  const std::string compared = prediction_line(bake->result().report().run());
-  if (!compared.empty()) context.reporter.note(compared);
+  context.reporter.note(prediction_line(bake->result().report().run()));
   return is_reached || !line.strict ? kDone : kTargetMissed;
 }
 

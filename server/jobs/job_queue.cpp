@@ -50,7 +50,19 @@ Result<void> JobQueue::recover() {
     waiting_.push_back(job);
   }
   run_waiting_jobs();
+  thread_.post([this] { make_worker_ready(); });
   return {};
+}
+
+void JobQueue::make_worker_ready() {
+  // Not beside work, which it would take time from.
+  if (!options_.keeps_worker_ready || ready_ || is_draining_ || !runs_.empty()) return;
+  auto worker = ReadyWorker::start(options_.worker);
+  if (worker.ok()) {
+    ready_ = std::move(worker).value();
+  } else {
+    spdlog::warn("no worker could be started ahead of need: {}", worker.error().message);
+  }
 }
 
 Result<std::shared_ptr<Job>> JobQueue::find_request(const std::string& request_id, const std::string& body_sha256) {
@@ -212,7 +224,7 @@ void JobQueue::start_job(const std::shared_ptr<Job>& job) {
   if (to_finish_.contains(name)) run->request_finish();
   add_run(run);
   ++num_running_;
-  if (auto started = run->start(*gate_); !started.ok()) {
+  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
     fail(job, started.error());
     end_run(name, {});
   }
@@ -323,6 +335,7 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   }
   runs_changed_.notify_all();
   run_waiting_jobs();
+  make_worker_ready();
 }
 
 Result<std::string> JobQueue::start_plan(const store::Work& work, PlanDone on_done) {
@@ -347,7 +360,7 @@ Result<std::string> JobQueue::start_plan_run(const store::Work& work, PlanDone o
   const auto run = std::make_shared<WorkerRun>(WorkerRun::Assignment{name, 1, true, work, options_.plan_limit, 0},
                                                options_.worker, content_, std::move(events));
   add_run(run);
-  if (auto started = run->start(*gate_); !started.ok()) {
+  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
     const std::lock_guard lock(mutex_);
     runs_.erase(name);
     return started.error();
@@ -414,6 +427,7 @@ void JobQueue::drain() {
       finish_plan(plans_.begin()->first, Error{ErrorCode::kUnavailable, "the server is stopping"});
     }
     for (const auto& [name, run] : runs_) run->kill("was running when the server stopped");
+    ready_.reset();
   });
   std::unique_lock lock(mutex_);
   runs_changed_.wait(lock, [this] { return runs_.empty(); });

@@ -17,6 +17,7 @@
 
 #include "common/base/result.h"
 #include "server/jobs/job.h"
+#include "server/jobs/ready_worker.h"
 #include "server/jobs/worker_link.h"
 #include "server/jobs/worker_run.h"
 #include "server/store/content_store.h"
@@ -28,6 +29,7 @@ namespace radbake::jobs {
 struct QueueOptions {
   WorkerOptions worker;
   std::filesystem::path spool_folder;
+  bool keeps_worker_ready = false;      ///< starts a worker ahead of need while nothing runs
   std::uint32_t max_running = 1;        ///< bakes at the same time
   std::uint32_t max_queued = 1000;      ///< bakes that wait
   std::uint32_t max_running_plans = 4;  ///< plans do not wait
@@ -90,6 +92,7 @@ class JobQueue {
   void finish_live(const std::string& name);
   void request_cancel(WorkerRun& run);
   void run_waiting_jobs();
+  void make_worker_ready();
   void start_job(const std::shared_ptr<Job>& job);
   Result<std::string> start_plan_run(const store::Work& work, PlanDone on_done);
   void advance(const std::string& name, store::JobState state);
@@ -120,6 +123,7 @@ class JobQueue {
   std::deque<std::shared_ptr<Job>> waiting_;
   std::set<std::string> to_finish_;  // of the jobs that have not ended
   std::map<std::string, PlanDone> plans_;
+  std::unique_ptr<ReadyWorker> ready_;  // null: none, or given to a run
   std::uint32_t num_running_ = 0;
   std::uint64_t next_plan_ = 1;
 

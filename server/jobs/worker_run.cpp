@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/version.h"
+#include "server/jobs/ready_worker.h"
 
 namespace radbake::jobs {
 namespace {
@@ -30,37 +31,46 @@ WorkerRun::WorkerRun(Assignment assignment, const WorkerOptions& options, store:
                      RunEvents events)
     : assignment_(std::move(assignment)), options_(options), content_(content), events_(std::move(events)) {}
 
-Result<void> WorkerRun::start(WorkerGate& gate) {
+Result<void> WorkerRun::start(WorkerGate& gate, std::unique_ptr<ReadyWorker> ready) {
   // Open every input now: from here on the worker needs no file system.
   std::vector<store::FileDescriptor> files;
-  std::vector<int> inherited;
+  handover::Assignment handed{assignment_.job, assignment_.attempt, {}};
   WorkOrder order{assignment_.is_plan, assignment_.work, {}, 0};
   for (const Digest& digest : assignment_.work.inputs) {
     RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(digest));
     order.inputs.push_back({digest, file.get()});
-    inherited.push_back(file.get());
+    handed.inputs.push_back(file.get());
     files.push_back(std::move(file));
   }
+  store::FileDescriptor socket;
+  {
+    const std::lock_guard lock(mutex_);
+    order_ = std::move(order);
+    started_at_ = last_heard_at_ = Clock::now();
+    if (auto hired = ready ? ready->hire(handed, events_.on_exit) : std::nullopt) {
+      process_ = std::move(hired->process);
+      socket = std::move(hired->socket);
+    } else {
+      RADBAKE_ASSIGN_OR_RETURN(socket, start_process(std::move(handed.inputs)));
+    }
+  }
+  gate.adopt(std::move(socket));
+  return {};
+}
+
+Result<store::FileDescriptor> WorkerRun::start_process(std::vector<int> inherited) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0) {
     return store::system_error("cannot create a socket for a worker");
   }
   store::FileDescriptor ours(ends[0]), theirs(ends[1]);
   inherited.push_back(theirs.get());
-
   std::vector<std::string> arguments = {"--fd",      std::to_string(theirs.get()),       "--job", assignment_.job,
                                         "--attempt", std::to_string(assignment_.attempt)};
   if (options_.log_json) arguments.emplace_back("--log-json");
-  {
-    const std::lock_guard lock(mutex_);
-    order_ = std::move(order);
-    started_at_ = last_heard_at_ = Clock::now();
-    auto process = WorkerProcess::start(options_.program, arguments, inherited, options_.limits, events_.on_exit);
-    if (!process.ok()) return process.error();
-    process_ = std::move(process).value();
-  }
-  gate.adopt(std::move(ours));
-  return {};
+  RADBAKE_ASSIGN_OR_RETURN(
+      process_, WorkerProcess::start(options_.program, arguments, inherited, options_.limits, events_.on_exit));
+  return ours;
 }
 
 Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link) {

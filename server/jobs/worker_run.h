@@ -27,6 +27,8 @@ struct WorkerOptions {
   std::chrono::milliseconds disconnect_grace{2'000};  ///< from a lost connection to the kill
 };
 
+class ReadyWorker;
+
 /// What a run tells its queue. Calls come from any thread and must be quick.
 struct RunEvents {
   std::function<void(const JobProgress&)> on_progress;
@@ -51,8 +53,9 @@ class WorkerRun {
 
   WorkerRun(Assignment assignment, const WorkerOptions& options, store::ContentStore& content, RunEvents events);
 
-  /// Opens the inputs, starts the process and gives the server's end of its socket to the gate.
-  Result<void> start(WorkerGate& gate);
+  /// Opens the inputs, takes the worker that is ready or starts one, and gives the server's end of its socket to the
+  /// gate. `ready`: may be null.
+  Result<void> start(WorkerGate& gate, std::unique_ptr<ReadyWorker> ready = nullptr);
 
   // What the worker reports.
   /// Checks that this is the worker that was started for this attempt, and gives it its work.
@@ -85,6 +88,8 @@ class WorkerRun {
   };
 
   std::optional<std::string> overstepped_limit(Clock::time_point now) const;
+  /// Starts a process that inherits the inputs; the server's end of its socket.
+  Result<store::FileDescriptor> start_process(std::vector<int> inherited);
 
   const Assignment assignment_;
   const WorkerOptions options_;

@@ -45,6 +45,7 @@ void declare_options(CLI::App& app, ProgramOptions& options) {
   BakeServerOptions& server = options.server;
   server.data = default_data_folder();
   server.queue.worker.program = default_worker();
+  server.queue.keeps_worker_ready = true;
   app.add_option("--listen", server.listen, "HOST:PORT (port 0: any free one) or unix:PATH")
       ->capture_default_str()
       ->type_name("ADDRESS");

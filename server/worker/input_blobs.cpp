@@ -8,9 +8,12 @@
 
 namespace radbake::worker {
 
-InputBlobs::InputBlobs(const v1::StartWork& start) {
-  for (const v1::InputBlob& input : start.inputs()) {
-    descriptors_.emplace(Digest{input.digest().sha256(), input.digest().size_bytes()}, input.fd());
+InputBlobs::InputBlobs(const v1::StartWork& start, const std::vector<int>& handed) {
+  for (int i = 0; i < start.inputs_size(); ++i) {
+    const v1::InputBlob& input = start.inputs(i);
+    const auto index = static_cast<std::size_t>(i);
+    descriptors_.emplace(Digest{input.digest().sha256(), input.digest().size_bytes()},
+                         index < handed.size() ? handed[index] : input.fd());
   }
 }
 

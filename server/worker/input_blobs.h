@@ -2,6 +2,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "common/base/digest.h"
 #include "common/base/result.h"
@@ -9,11 +10,12 @@
 
 namespace radbake::worker {
 
-/// The blobs that a worker inherited as open read-only descriptors. The store checked size and digest when it took
-/// them; they are not hashed again.
+/// The blobs that a worker inherited, or was handed, as open read-only descriptors. The store checked size and digest
+/// when it took them; they are not hashed again.
 class InputBlobs {
  public:
-  explicit InputBlobs(const v1::StartWork& start);
+  /// `handed`: descriptors in the order of the inputs; empty: the inputs name them.
+  explicit InputBlobs(const v1::StartWork& start, const std::vector<int>& handed = {});
 
   /// Errors: kNotFound for a blob that is not among the inputs, kDataLoss for a file that is shorter than its digest
   /// says.

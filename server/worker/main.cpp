@@ -1,11 +1,14 @@
+#include <grpc/grpc.h>
 #include <grpcpp/create_channel_posix.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <string>
+#include <utility>
 
 #include "common/base/version.h"
 #include "common/log/log.h"
+#include "server/handover/handover.h"
 #include "server/worker/run_worker.h"
 
 using namespace radbake;  // NOLINT(google-build-using-namespace)
@@ -18,13 +21,18 @@ int main(int argc, char** argv) {
   app.add_option("--fd", fd, "Inherited socket that is connected to radbaked")
       ->required()
       ->check(CLI::Range(0, 1 << 20));
-  app.add_option("--job", identity.job, "Name of the job")->required();
-  app.add_option("--attempt", identity.attempt, "Number of this attempt at the job")->required();
+  CLI::Option* job = app.add_option("--job", identity.job, "Name of the job");
+  CLI::Option* attempt = app.add_option("--attempt", identity.attempt, "Number of this attempt at the job");
+  job->needs(attempt);
+  attempt->needs(job);
+  bool waits = false;
+  app.add_flag("--wait", waits, "Wait to be told the job over the socket")->excludes(job)->excludes(attempt);
   app.add_flag("--log-json", log.is_json, "Log JSON lines instead of text");
   app.set_version_flag("--version", std::string("radbake-worker ") + kEngineVersion + ", protocol " +
                                         std::to_string(kProtocolMajor) + "." + std::to_string(kProtocolMinor));
   try {
     app.parse(argc, argv);
+    if (!*job && !waits) throw CLI::RequiredError("--job or --wait");
   } catch (const CLI::ParseError& problem) {
     return app.exit(problem) == 0 ? worker::kExitDone : worker::kExitUsage;
   }
@@ -33,7 +41,18 @@ int main(int argc, char** argv) {
     return worker::kExitUsage;
   }
 
+  // What takes time and is the same for all jobs.
+  grpc_init();
+  double waited_seconds = 0;
+  if (waits) {
+    auto handed = handover::take(fd);
+    if (!handed.ok()) return worker::kExitServerGone;
+    waited_seconds = worker::seconds_since_process_start();
+    identity.job = std::move(handed->job);
+    identity.attempt = handed->attempt;
+    identity.inputs = std::move(handed->inputs);
+  }
   const auto channel = grpc::CreateInsecureChannelFromFd("radbaked", fd);
-  identity.start_seconds = worker::seconds_since_process_start();
+  identity.start_seconds = worker::seconds_since_process_start() - waited_seconds;
   return worker::run_worker(channel, identity);
 }

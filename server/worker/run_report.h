@@ -13,7 +13,10 @@ namespace radbake::worker {
 struct WorkerIdentity {
   std::string job;
   std::uint32_t attempt = 1;
-  double start_seconds = 0;  ///< from the creation of the process to its first message
+  double start_seconds =
+      0;  ///< from the creation of the process, or from when it was told its job, to its first message
+  std::vector<int> inputs = {};  ///< descriptors as they were handed over, in the order of StartWork.inputs; empty:
+                                 ///< they were inherited under the numbers that it names
 };
 
 /// Seconds since the kernel created this process, in its ticks of 10 ms; 0 where /proc does not tell.

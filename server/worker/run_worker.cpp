@@ -57,8 +57,8 @@ class StreamObserver : public radiosity::BakeObserver {
 };
 
 /// Decodes the scene of an order.
-Result<Scene> read_scene(const v1::StartWork& start) {
-  const InputBlobs inputs(start);
+Result<Scene> read_scene(const v1::StartWork& start, const WorkerIdentity& identity) {
+  const InputBlobs inputs(start, identity.inputs);
   const Digest manifest{start.manifest().sha256(), start.manifest().size_bytes()};
   if (manifest.size_bytes > start.limits().max_manifest_bytes()) {
     return Error{ErrorCode::kResourceExhausted, "the scene manifest has " + std::to_string(manifest.size_bytes) +
@@ -142,8 +142,8 @@ radiosity::BakeOptions options_of(const v1::StartWork& start) {
   return options;
 }
 
-Result<v1::WorkerReport> plan(const v1::StartWork& start, ReportStream& stream) {
-  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
+Result<v1::WorkerReport> plan(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
+  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start, identity));
   RADBAKE_ASSIGN_OR_RETURN(const radiosity::PlannedBake planned,
                            radiosity::plan_scene(scene, options_of(start), stream.stop_token()));
   v1::WorkerReport report;
@@ -156,7 +156,7 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   const auto began_at = Clock::now();
   StageClock before, after;
   before.begin("decoding");
-  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start));
+  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start, identity));
   before.end();
 
   radiosity::BakeOptions options = options_of(start);
@@ -185,7 +185,10 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   report = to_message(outcome.report);
   report.set_engine_version(kEngineVersion);
   *report.mutable_run() = run_report(identity, stages, seconds_since(began_at), static_cast<std::uint32_t>(threads));
-  *report.mutable_run()->mutable_prediction() = to_message(outcome.report.prediction);
+  // What is baked towards a target is planned pass by pass, and not predicted as a whole.
+  if (outcome.report.prediction.total.cpu_seconds > 0) {
+    *report.mutable_run()->mutable_prediction() = to_message(outcome.report.prediction);
+  }
   *report.mutable_run()->mutable_costs() = to_message(outcome.report.costs);
   const std::uint64_t num_rays = report.num_row_rays() + report.num_gather_rays() + report.num_light_rays();
   for (const radiosity::PassSummary& pass : outcome.report.passes) {
@@ -202,7 +205,7 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
 /// Does the work; nothing that it throws gets further.
 Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
   try {
-    return start.plan_only() ? plan(start, stream) : bake(start, identity, stream);
+    return start.plan_only() ? plan(start, identity, stream) : bake(start, identity, stream);
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kResourceExhausted, "the bake needs more memory than its worker may use"};
   } catch (const std::exception& exception) {

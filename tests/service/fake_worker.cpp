@@ -18,10 +18,12 @@
 #include <iostream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/base/digest.h"
 #include "common/base/version.h"
 #include "radbake/v1/worker.grpc.pb.h"
+#include "server/handover/handover.h"
 
 namespace radbake::testing {
 namespace {
@@ -31,8 +33,8 @@ using Stream = grpc::ClientReaderWriter<v1::WorkerReport, v1::WorkerCommand>;
 
 class FakeWorker {
  public:
-  FakeWorker(Stream& stream, std::string job, unsigned attempt)
-      : stream_(stream), job_(std::move(job)), attempt_(attempt) {}
+  FakeWorker(Stream& stream, std::string job, unsigned attempt, std::vector<int> handed)
+      : stream_(stream), job_(std::move(job)), attempt_(attempt), handed_(std::move(handed)) {}
 
   void greet(const std::string& program) {
     v1::WorkerReport report;
@@ -201,12 +203,14 @@ class FakeWorker {
 
   std::string read_inputs() const {
     std::string report;
-    for (const v1::InputBlob& input : start_.inputs()) {
+    for (int i = 0; i < start_.inputs_size(); ++i) {
+      const v1::InputBlob& input = start_.inputs(i);
+      const int fd = handed_.empty() ? input.fd() : handed_.at(static_cast<std::size_t>(i));
       std::string bytes(input.digest().size_bytes() + 1, '\0');
-      const ssize_t size = pread(input.fd(), bytes.data(), bytes.size(), 0);
+      const ssize_t size = pread(fd, bytes.data(), bytes.size(), 0);
       bytes.resize(size < 0 ? 0 : static_cast<std::size_t>(size));
       const bool is_equal = digest_of(bytes).sha256 == input.digest().sha256();
-      const bool is_read_only = (fcntl(input.fd(), F_GETFL) & O_ACCMODE) == O_RDONLY;
+      const bool is_read_only = (fcntl(fd, F_GETFL) & O_ACCMODE) == O_RDONLY;
       report += is_equal && is_read_only ? "good " : "bad ";
     }
     return report;
@@ -219,6 +223,7 @@ class FakeWorker {
   Stream& stream_;
   const std::string job_;
   const unsigned attempt_;
+  const std::vector<int> handed_;  // inputs of a worker that was started ahead of need
   v1::StartWork start_;
   std::atomic<bool> is_cancelled_ = false, is_finishing_ = false;
   std::thread reader_;
@@ -239,6 +244,16 @@ int main(int argc, char** argv) {
     if (std::strcmp(argv[i], "--job") == 0) job = argv[i + 1];
     if (std::strcmp(argv[i], "--attempt") == 0) attempt = static_cast<unsigned>(std::atoi(argv[i + 1]));
   }
+  std::vector<int> handed;
+  if (std::strcmp(argv[argc - 1], "--wait") == 0) {
+    if (program == kDeadWhileReadyName) return 1;
+    auto assignment = radbake::handover::take(fd);
+    if (!assignment.ok()) return 3;
+    job = assignment->job;
+    attempt = assignment->attempt;
+    handed = assignment->inputs;
+    std::cerr << kReadyWords << std::endl;
+  }
   if (fd < 0 || job.empty() || attempt == 0) return 2;
   if (program == kMuteName) std::this_thread::sleep_for(std::chrono::hours(1));
 
@@ -246,7 +261,7 @@ int main(int argc, char** argv) {
   const auto stub = radbake::v1::Workers::NewStub(grpc::CreateInsecureChannelFromFd("server", fd));
   grpc::ClientContext context;
   const auto stream = stub->Report(&context);
-  FakeWorker worker(*stream, job, attempt);
+  FakeWorker worker(*stream, job, attempt, handed);
   worker.greet(program);
   worker.work();
   // As a real worker does: a clean end once everything is accepted.

@@ -22,6 +22,9 @@ enum FakeWork {
 inline constexpr char kWrongAttemptName[] = "worker-of-a-wrong-attempt";
 inline constexpr char kWrongVersionName[] = "worker-of-a-wrong-version";
 inline constexpr char kMuteName[] = "worker-that-never-connects";
+inline constexpr char kDeadWhileReadyName[] = "worker-that-does-not-wait";
+/// What a worker that was started ahead of need says on stderr when it gets its work.
+inline constexpr char kReadyWords[] = "the fake worker was ready";
 
 /// Side of the tiles, and width of the layer, which is as high as its tiles.
 inline constexpr int kTileSize = 8;

@@ -116,6 +116,63 @@ TEST_F(WorkersServiceTest, HandsDownInputsThatCanBeReadAndNotWritten) {
   expect_failed(bake(kReadInputs), grpc::INVALID_ARGUMENT, "good good ");
 }
 
+/// Workers that were started ahead of need.
+class ReadyWorkersTest : public WorkersServiceTest {
+ protected:
+  static service::BakeServerOptions ready_options_in(const std::filesystem::path& folder,
+                                                     const std::string& program = "") {
+    service::BakeServerOptions options = options_in(folder, program);
+    options.queue.keeps_worker_ready = true;
+    return options;
+  }
+
+  TemporaryFolder ready_folder_;
+};
+
+TEST_F(ReadyWorkersTest, BakeOneJobEach) {
+  ::testing::internal::CaptureStderr();
+  {
+    TestServer server(ready_options_in(ready_folder_.path()));
+    TestClient client = server.client();
+    for (int i = 0; i < 3; ++i) {
+      const v1::Bake bake = client.watch(client.submit(kSucceed).name()).finished();
+      EXPECT_EQ(bake.state(), v1::SUCCEEDED) << bake.error().message();
+    }
+  }
+  // The first at least: whether the next is ready in time is up to the machine.
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr(kReadyWords));
+}
+
+TEST_F(ReadyWorkersTest, GetTheirInputsAndNothingElse) {
+  TestServer server(ready_options_in(ready_folder_.path()));
+  TestClient client = server.client();
+  expect_failed(client.watch(client.submit(kReadInputs).name()).finished(), grpc::INVALID_ARGUMENT, "good good ");
+  std::string kinds = client.watch(client.submit(kListDescriptors).name()).finished().error().message();
+  std::sort(kinds.begin(), kinds.end());
+  EXPECT_EQ(kinds, "FFS");  // the manifest, one mesh, the socket
+}
+
+TEST_F(ReadyWorkersTest, EndTheirJobAsAnyWorkerDoes) {
+  TestServer server(ready_options_in(ready_folder_.path()));
+  TestClient client = server.client();
+  expect_failed(client.watch(client.submit(kCrash).name()).finished(), grpc::INTERNAL,
+                "the worker was killed by SIGSEGV");
+  const v1::Bake running = client.submit(kIgnoreCancel);
+  client.wait_for(running.name(), v1::FORM_FACTORS);
+  ASSERT_TRUE(client.cancel(running.name()).ok());
+  EXPECT_EQ(client.watch(running.name()).finished().state(), v1::CANCELLED);
+  EXPECT_EQ(client.watch(client.submit(kSucceed).name()).finished().state(), v1::SUCCEEDED);
+}
+
+TEST_F(ReadyWorkersTest, AreDoneWithoutWhereTheyDoNotWait) {
+  TestServer server(ready_options_in(ready_folder_.path(), kDeadWhileReadyName));
+  TestClient client = server.client();
+  for (int i = 0; i < 3; ++i) {
+    const v1::Bake bake = client.watch(client.submit(kSucceed).name()).finished();
+    EXPECT_EQ(bake.state(), v1::SUCCEEDED) << bake.error().message();
+  }
+}
+
 TEST_F(WorkersServiceTest, HoldsAWorkerToItsLimits) {
   TemporaryFolder folder;
   service::BakeServerOptions options = options_in(folder.path());

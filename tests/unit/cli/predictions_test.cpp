@@ -40,7 +40,10 @@ TEST(Predictions, StandBesideWhatCameOfThem) {
 TEST(Predictions, FitOneLine) {
   EXPECT_EQ(prediction_line(run_report()),
             "took 12 s of CPU time, predicted 11 s (9.8 s to 13 s), and 512 MB of memory, predicted 480 MB");
-  EXPECT_EQ(prediction_line(v1::RunReport()), "");
+  v1::RunReport unpredicted;
+  unpredicted.set_cpu_seconds(3.7);
+  unpredicted.set_peak_memory_bytes(41 << 20);
+  EXPECT_EQ(prediction_line(unpredicted), "took 3.7 s of CPU time and 41 MB of memory");
 }
 
 }  // namespace

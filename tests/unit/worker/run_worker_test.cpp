@@ -113,6 +113,7 @@ TEST(RunWorker, SendsTilesAndThePlaneThatTheResultNames) {
   EXPECT_EQ(digest.sha256(), digest_of(plane).sha256);
   EXPECT_EQ(result.report().engine_version(), kEngineVersion);
   EXPECT_EQ(result.report().plan().survey().num_triangles(), 2U);
+  EXPECT_FALSE(result.report().run().has_prediction());  // nothing was predicted
 }
 
 TEST(RunWorker, FillsInTheReportOfTheRun) {

@@ -3,8 +3,10 @@
 #include "client/cli/commands.h"
 #include "client/cli/plan_page.h"
 #include "client/cli/proto_json.h"
+#include "client/cli/reached_error.h"
 #include "client/cli/requests.h"
 #include "client/cli/send_scene.h"
+#include "client/options/target_options.h"
 
 namespace radbake::cli {
 namespace {
@@ -49,6 +51,11 @@ ExitCode run_plan(const CommandContext& context) {
   nlohmann::ordered_json& client = json["client_stages"] = nlohmann::ordered_json::array();
   for (const v1::StageSeconds& stage : stages.stages()) client.push_back(to_json(stage));
   context.reporter.answer(plan_page(*plan, name, read->report.warnings), json);
+  const BakeChoices& bake = context.line.bake;
+  if (const double asked = options::asked_error(bake); asked > 0 || bake.time_budget_ms > 0) {
+    context.reporter.note("this is the first pass; others follow until " +
+                          (asked > 0 ? "the error is " + error_percent(asked) : std::string("the time is up")));
+  }
   return kDone;
 }
 

@@ -116,7 +116,8 @@ Result<v1::BakeResult> send_result(const radiosity::BakeOutcome& outcome, v1::Pr
     sent += bytes;
     progress.set_state(v1::WRITING);
     // A bake that reached what was asked may have been expected to take longer.
-    progress.set_fraction(begun_at + (1 - begun_at) * static_cast<double>(sent) / static_cast<double>(total));
+    progress.set_fraction(begun_at + (1 - begun_at) * static_cast<double>(sent) /
+                                         static_cast<double>(std::max<std::uint64_t>(total, 1)));
     progress.set_seconds_left(-1);
     progress.set_steps_done(sent);
     progress.set_steps_total(total);

@@ -426,6 +426,14 @@ class Plans(CliTest):
                 self.assertEqual(states[name], "on")
                 self.assertEqual({k for k in states if k not in (name, "occlusion") and states[k] != plain[k]}, set())
 
+    def test_a_plan_towards_an_error_says_that_it_is_of_the_first_pass(self):
+        for arguments, words in ((["--quality", "draft"], "until the error is 10 %"),
+                                 (["--time-budget", "5s"], "until the time is up")):
+            result = self.run_cli("plan", CORNELL, *SMALL, *arguments)
+            self.assert_exit(result, 0)
+            self.assertIn(words, result.stderr)
+        self.assertNotIn("first pass", self.run_cli("plan", CORNELL, *QUICK).stderr)
+
     def test_a_dry_run_is_a_plan(self):
         arguments = ["--effect", "interreflection=off", "--sky", "5,5,5"]
         plan = self.plan(CORNELL, *arguments)

@@ -16,6 +16,8 @@ namespace {
 
 /// Up to this many emitters are weighed one by one at each receiver; more of them by their tree.
 constexpr std::size_t kMostWeighed = 64;
+/// Nodes of a cut through the tree. Fewer are cheaper, and their choices worse by more than that.
+constexpr std::size_t kMostInCut = 48;
 
 /// Numbers that keep the seeds of lights apart; the emitters have the receiver's own.
 enum Purpose : std::uint64_t { kSun = 31, kEnvironment = 32 };
@@ -181,7 +183,7 @@ bool DirectLight::choose_emitters(Scratch& scratch, std::size_t num_samples, std
   const std::size_t num_emitters = emitters_.size();
   const auto per_samples = 1 / static_cast<double>(samples);
   if (num_emitters > kMostWeighed) {
-    tree_.cut(scratch.receiver, scratch.cut);
+    tree_.cut(scratch.receiver, kMostInCut, scratch.cut);
     if (scratch.cut.parts.empty()) return false;
     for (std::size_t k = 0; k < num_samples; ++k) {
       const EmitterTree::Choice choice = tree_.choose(scratch.receiver, scratch.cut, chosen.z[k] * 0x1p-32);

@@ -122,37 +122,32 @@ EmitterTree::Seen EmitterTree::see(const Node& node, const ReceiverColumns& rece
   if (distance <= radius) return {node.power / (radius * radius), 1};
 
   // The angle of the sphere, and those of its middle to both normals.
-  const float width = radius / distance, sine = width, cosine = std::sqrt(1 - width * width);
-  const auto along = [&](const std::array<float, 3>& v) {
-    return (d[0] * v[0] + d[1] * v[1] + d[2] * v[2]) / distance;
+  const float per_distance = 1 / distance, width = radius * per_distance, cosine = std::sqrt(1 - width * width);
+  const auto along = [&](const Vec3& v) {
+    return (d[0] * static_cast<float>(v.x) + d[1] * static_cast<float>(v.y) + d[2] * static_cast<float>(v.z)) *
+           per_distance;
   };
-  const std::array<float, 3> normal = {static_cast<float>(receiver.normal.x), static_cast<float>(receiver.normal.y),
-                                       static_cast<float>(receiver.normal.z)};
-  float least = kLeastCosineOfSeveral;
-  const float towards = along(normal);
-  float receiving = cosine_of_difference(sine_of(towards), towards, sine, cosine);
-  if (receiver.is_flat) {
-    least = kLeastCosine;
-    // The lobe about an interpolated normal ends at the surface or at its own horizon, whichever comes first.
-    if (receiving <= 0) return {0, width};
-  }
-  receiving = std::max(receiving, least);
+  // The lobe about an interpolated normal ends at the surface or at its own horizon, whichever comes first.
+  const float towards = along(receiver.normal);
+  float receiving = cosine_of_difference(sine_of(towards), towards, width, cosine);
+  if (receiver.is_flat && receiving <= 0) return {0, width};
+  receiving = std::max(receiving, receiver.is_flat ? kLeastCosine : kLeastCosineOfSeveral);
 
-  float back = -along(node.axis);
+  float back = -(d[0] * node.axis[0] + d[1] * node.axis[1] + d[2] * node.axis[2]) * per_distance;
   if (node.is_two_sided) back = std::fabs(back);
-  const float of_cone = cosine_of_difference(sine_of(back), back, node.sine, node.cosine);
-  const float of_cone_sine = sine_of_difference(sine_of(back), back, node.sine, node.cosine);
-  float sending = cosine_of_difference(of_cone_sine, of_cone, sine, cosine);
+  const float back_sine = sine_of(back);
+  const float of_cone = cosine_of_difference(back_sine, back, node.sine, node.cosine);
+  const float of_cone_sine = sine_of_difference(back_sine, back, node.sine, node.cosine);
+  const float sending = cosine_of_difference(of_cone_sine, of_cone, width, cosine);
   if (sending <= 0) return {0, width};
-  sending = std::max(sending, kLeastCosine);
-  return {node.power * receiving * sending / squared, width};
+  return {node.power * receiving * std::max(sending, kLeastCosine) / squared, width};
 }
 
 bool EmitterTree::is_settled(const Node& node, float width) const {
   return node.right == 0 || (width < kNarrow && node.cosine > kNarrowCosine);
 }
 
-void EmitterTree::cut(const ReceiverColumns& receiver, Cut& cut) const {
+void EmitterTree::cut(const ReceiverColumns& receiver, std::size_t most, Cut& cut) const {
   cut.parts.clear();
   cut.cumulative.clear();
   const auto less = [](const Cut::Part& a, const Cut::Part& b) { return a.priority < b.priority; };
@@ -161,11 +156,11 @@ void EmitterTree::cut(const ReceiverColumns& receiver, Cut& cut) const {
     if (!(seen.importance > 0)) return;
     const bool is_leaf = nodes_[static_cast<std::size_t>(node)].right == 0;
     const bool is_narrow = is_leaf || seen.width < kNarrow;
-    cut.parts.push_back({node, seen.importance, is_narrow ? 0 : seen.importance * seen.width});
+    cut.parts.push_back({node, seen.importance, seen.width, is_narrow ? 0 : seen.importance * seen.width});
     std::push_heap(cut.parts.begin(), cut.parts.end(), less);
   };
   add(0);
-  while (!cut.parts.empty() && cut.parts.size() < kMostInCut && cut.parts.front().priority > 0) {
+  while (!cut.parts.empty() && cut.parts.size() < most && cut.parts.front().priority > 0) {
     const std::int32_t node = cut.parts.front().node;
     std::pop_heap(cut.parts.begin(), cut.parts.end(), less);
     cut.parts.pop_back();
@@ -190,21 +185,24 @@ EmitterTree::Choice EmitterTree::choose(const ReceiverColumns& receiver, const C
 
   // Go down while the node is wide.
   std::int32_t at = cut.parts[part].node;
+  float width = cut.parts[part].width;
   for (;;) {
     const Node& node = nodes_[static_cast<std::size_t>(at)];
-    if (node.right == 0 || is_settled(node, see(node, receiver).width)) break;
-    const double left = see(nodes_[static_cast<std::size_t>(at + 1)], receiver).importance;
-    const double right = see(nodes_[static_cast<std::size_t>(node.right)], receiver).importance;
-    if (!(left + right > 0)) return {};
-    const double of_left = left / (left + right);
+    if (is_settled(node, width)) break;
+    const Seen left = see(nodes_[static_cast<std::size_t>(at + 1)], receiver);
+    const Seen right = see(nodes_[static_cast<std::size_t>(node.right)], receiver);
+    if (!(left.importance + right.importance > 0)) return {};
+    const double of_left = static_cast<double>(left.importance / (left.importance + right.importance));
     if (rest < of_left) {
       rest /= of_left;
       probability *= of_left;
       at = at + 1;
+      width = left.width;
     } else {
       rest = (rest - of_left) / (1 - of_left);
       probability *= 1 - of_left;
       at = node.right;
+      width = right.width;
     }
   }
 

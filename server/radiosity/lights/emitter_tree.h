@@ -15,27 +15,27 @@ namespace radbake::radiosity {
 ///
 /// P: power; d, R: distance and radius of its bounding sphere; cos, cos': the largest cosines at the receiver and at
 /// the emitters that any point of the sphere and any normal of the node's cone allow. 0 only where no light can arrive.
-/// A receiver cuts the tree into up to kMostInCut nodes that are small beside their distance; a sample chooses a node
+/// A receiver cuts the tree into nodes that are small beside their distance, up to a number; a sample chooses a node
 /// of the cut by its importance, goes down by the children's importance where the node is still wide, else takes one of
 /// its emitters by power.
 /// Cost: O(cut) a receiver, O(log emitters) a sample. Source: Conty Estevez & Kulla 2018, "Importance sampling of many
 /// lights with adaptive tree splitting"; Walter et al. 2005 (cuts).
 class EmitterTree {
  public:
-  static constexpr std::size_t kMostInCut = 48;
-
   explicit EmitterTree(std::span<const Emitter> emitters);
 
   struct Cut {
     struct Part {
       std::int32_t node;
       float importance;
+      float width;
       float priority;  ///< of being cut further
     };
     std::vector<Part> parts;
     std::vector<double> cumulative;  ///< [parts] importance
   };
-  void cut(const ReceiverColumns& receiver, Cut& cut) const;
+  /// Into at most `most` nodes.
+  void cut(const ReceiverColumns& receiver, std::size_t most, Cut& cut) const;
 
   struct Choice {
     std::int32_t emitter = -1;  ///< none: nothing arrives from where the choice fell

@@ -18,7 +18,7 @@ constexpr float kLeastCosine = 0.05f, kLeastCosineOfSeveral = 0.3f, kLeastEmitte
 /// Least weight of a corner beside the largest: what bounds the weight of a sample.
 constexpr float kLeastCorner = 0.1f;
 /// An emitter whose area is more than this times the squared distance to its nearest point is sampled by solid angle.
-constexpr float kNear = 0.5f;
+constexpr float kNear = 2.0f;
 constexpr float kLeastSquaredDistance = 1e-14f;
 
 struct Float3 {

@@ -127,15 +127,16 @@ TEST(EmitterTree, ChoosesWithTheProbabilityThatItStates) {
   const std::vector<Emitter> emitters = make_emitters(surfaces);
   ASSERT_GT(emitters.size(), 200u);
   const EmitterTree tree(emitters);
+  constexpr std::size_t kMostInCut = 16;
   EmitterTree::Cut cut;
   for (const SurfacePoint at : {SurfacePoint{0, 0.49, 0.5}, SurfacePoint{1, 0.4, 0.2}}) {
     const std::vector<Site> sites = {front_site(surfaces, at, surfaces.normals[at.triangle])};
     const std::vector<std::uint32_t> open = {0};
     ReceiverColumns receiver;
     receiver.fill(sites, open, surfaces);
-    tree.cut(receiver, cut);
+    tree.cut(receiver, kMostInCut, cut);
     ASSERT_FALSE(cut.parts.empty());
-    EXPECT_LE(cut.parts.size(), EmitterTree::kMostInCut);
+    EXPECT_LE(cut.parts.size(), kMostInCut);
     std::vector<double> means(emitters.size(), 0);
     constexpr int kPoints = 1 << 20;
     double least = 1;

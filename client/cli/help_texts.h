@@ -89,7 +89,8 @@ inline constexpr char kWatchFooter[] =
     "  radbake watch bakes/3f9c && radbake download bakes/3f9c -o baked/\n\n";
 
 inline constexpr char kFinishFooter[] =
-    "\nThe bake ends at the end of its first pass, or at once in a later one, and has succeeded then. Returns at once;\n"
+    "\nThe bake ends at the end of its first pass, or at once in a later one, and has succeeded then. Returns at "
+    "once;\n"
     "a bake that has ended stays as it is.\n"
     "\nExamples:\n"
     "  radbake finish bakes/3f9c --server bakery:7419\n"

@@ -51,7 +51,7 @@ Result<void> run(const std::string& path, const BakeOptions& options, int runs) 
     const HemisphereRows estimator(surfaces, patches, visibility, prepared->plan.rays_per_row);
     const DirectLight direct(surfaces, visibility, kLightSamplesPerPatch);
     const PatchSampler sampler(surfaces, patches, estimator, direct, 0);
-    sample_patches(sampler, patches.num_cells(), [](std::uint32_t, FormFactorRow&, const PatchSample&) {}, {}, {});
+    sample_patches(sampler, patches.num_cells(), {}, [](std::uint32_t, FormFactorRow&, const PatchSample&) {}, {}, {});
   });
   measure("gather", *prepared->visibility, embree, runs, [&](const Visibility& visibility) {
     const HemisphereEstimator estimator(surfaces, patches, visibility, prepared->plan.rays_per_texel);

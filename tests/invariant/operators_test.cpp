@@ -134,7 +134,8 @@ TEST(DenseOperator, BakesTheBytesOfTheSparseOne) {
 TEST(StreamedOperator, BakesTheMapsOfTheSparseOneWithinSamplingError) {
   // Eight seeds of either, their means compared: the spread of the seeds is the sampling error.
   constexpr int kSeeds = 8;
-  constexpr double kStudent = 4.5;  // difference of two means of 8, two-sided 99.95 % at 14 degrees of freedom: 4.5
+  // Difference of two means of 8, two-sided 99.95 % at 14 degrees of freedom: 4.5.
+  constexpr double kStudent = 4.5;
   const Scene scene = small_emitter_room(0.8);
   for (const Solver solver : {Solver::kKrylov, Solver::kShooting}) {
     double sums[2] = {}, squares[2] = {};
@@ -151,7 +152,7 @@ TEST(StreamedOperator, BakesTheMapsOfTheSparseOneWithinSamplingError) {
     }
     const double variance = (squares[0] - sums[0] * sums[0] + squares[1] - sums[1] * sums[1]) / (kSeeds - 1);
     EXPECT_LE(std::fabs(sums[0] - sums[1]), kStudent * std::sqrt(variance)) << solver_name(solver);
-    EXPECT_LE(std::sqrt(variance), 0.01 * sums[0]);  // or it would say little
+    EXPECT_LE(std::sqrt(variance), 0.012 * sums[0]);  // or it would say little
   }
 }
 

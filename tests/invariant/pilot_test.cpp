@@ -121,8 +121,9 @@ TEST(Plan, LeavesOutOutputsThatAreForcedOff) {
   options.effects = {{Effect::kVertices, false}, {Effect::kLayers, false}};
   const BakeOutcome outcome = baked(tests::small_emitter_room(0.5), options);
   EXPECT_EQ(outcome.report.plan.num_vertex_groups, 0u);
-  ASSERT_EQ(outcome.layers.size(), 2u);
+  ASSERT_EQ(outcome.layers.size(), 3u);
   EXPECT_EQ(outcome.layers[1].name, "lightmap_0_ao");
+  EXPECT_EQ(outcome.layers[2].name, "error_0");
 }
 
 }  // namespace

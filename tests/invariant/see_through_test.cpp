@@ -169,7 +169,7 @@ TEST(Layers, DirectAndIndirectAddUpToAllLight) {
   BakeOptions options{.atlas_size = 128, .rays = 64};
   options.wants_direct = options.wants_indirect = true;
   const BakeOutcome outcome = baked(small_emitter_room(0.5), options);
-  ASSERT_EQ(outcome.layers.size(), 3u);
+  ASSERT_EQ(outcome.layers.size(), 4u);
   EXPECT_EQ(outcome.layers[1].name, "lightmap_0_direct");
   EXPECT_EQ(outcome.layers[2].name, "lightmap_0_indirect");
   double direct = 0, indirect = 0;
@@ -208,7 +208,7 @@ TEST(Layers, AmbientOcclusionIsTheOpenShareOfTheLobe) {
   for (const double distance : {1.0, 2.5, 4.0}) {
     options.ao_distance = distance;
     const BakeOutcome outcome = baked(builder.scene(), options);
-    ASSERT_EQ(outcome.layers.size(), 2u);
+    ASSERT_EQ(outcome.layers.size(), 3u);
     EXPECT_EQ(outcome.layers[1].name, "lightmap_0_ao");
     const double exact = distance < 2 ? 1 : 4 / (distance * distance);
     double sum = 0;

@@ -131,6 +131,7 @@ class Bake {
     prepared_.patch_edge /= 2;
     prepared_.patches =
         make_patches(surfaces_, *prepared_.visibility, {prepared_.patch_edge, max_refined_patches(), stop_});
+    prepared_.reached_backs = find_reached_backs(surfaces_, prepared_.patches, *prepared_.visibility, stop_);
     twice_as_large_.clear();
     outcome_.report.num_patches = prepared_.patches.size();
     if (lightmaps_) lightmaps_->forget_gathered();
@@ -203,7 +204,7 @@ class Bake {
   }
 
   LightError current_error() const {
-    const double algebraic = outcome_.report.solver.error_bound;
+    const double algebraic = error_bound_;
     if (lightmaps_) return estimate_error(*lightmaps_, algebraic);
     return estimate_error(
         vertices_->estimate(), [&](std::size_t g) { return vertices_->is_known()[g] != 0; },
@@ -247,6 +248,9 @@ class Bake {
       own.coarser = averaged(own.radiosity);
       light.push_back(std::move(own));
     }
+    error_bound_ = 0;
+    for (const ReplicateSystem& system : systems)
+      error_bound_ = std::max(error_bound_, system.report.solver.error_bound);
     report.num_row_rays += summary.num_row_rays;
     report.num_light_rays += summary.num_light_rays;
     if (results_.num_passes > 0) return light;
@@ -257,6 +261,18 @@ class Bake {
     report.energy = first.energy;
     report.warnings.insert(report.warnings.end(), first.warnings.begin(), first.warnings.end());
     return light;
+  }
+
+  /// What counts as no light: what the solver cannot tell from 0, and a thousandth of what patches send in the mean.
+  /// A few rays that slip along a contact bring as much into what is closed.
+  double darkness_of(const std::vector<PatchLight>& light) const {
+    constexpr double kShare = 1e-3;
+    double flux = 0, area = 0;
+    for (std::uint32_t patch = 0; patch < light.front().radiosity.size(); ++patch) {
+      flux += prepared_.patches.area(patch) * max_component(light.front().radiosity[patch]);
+      area += prepared_.patches.area(patch);
+    }
+    return std::max(error_bound_, area > 0 ? kShare * flux / area : 0);
   }
 
   /// What patches twice as large would send: the mean of their parts, weighted by area.
@@ -300,16 +316,10 @@ class Bake {
     };
     const std::vector<HemisphereEstimator> of_texels = estimators(settings.rays_per_texel);
     const std::vector<HemisphereEstimator> of_nodes = estimators(settings.rays_per_node);
+    const double dark = darkness_of(light);
     const auto scene_of = [&](const std::vector<HemisphereEstimator>& rows) {
-      return GatherScene{surfaces_,
-                         prepared_.shadows(),
-                         rows[0],
-                         direct,
-                         sent,
-                         surfaces_.sky,
-                         seed,
-                         std::span(rows).subspan(1),
-                         outcome_.report.solver.error_bound};
+      return GatherScene{surfaces_, prepared_.shadows(),        rows[0],     direct, sent, surfaces_.sky,
+                         seed,      std::span(rows).subspan(1), dark};
     };
     const GatherScene alone = scene_of(of_texels), nodes = scene_of(of_nodes);
     std::vector<std::uint8_t> levels;
@@ -421,6 +431,7 @@ class Bake {
   std::optional<VertexGather> vertices_;
   std::vector<std::uint32_t> twice_as_large_;  ///< [patches]
   bool has_ended_early_ = false;
+  double error_bound_ = 0;  ///< of the last pass's solutions, lx
   PassResults results_;
   BakeOutcome outcome_;
 };

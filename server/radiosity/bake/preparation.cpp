@@ -7,6 +7,7 @@
 #include "server/radiosity/bake/cpu_clock.h"
 #include "server/radiosity/bake/on_threads.h"
 #include "server/radiosity/bake/pilot.h"
+#include "server/radiosity/form_factor/patch_rows.h"
 #include "server/radiosity/gather/receive.h"
 #include "server/radiosity/survey/probe.h"
 #include "server/radiosity/threads/for_each_range.h"
@@ -104,6 +105,7 @@ Result<std::unique_ptr<Preparation>> prepare_scene(const Scene& scene, const Bak
   probe_escape(surfaces, *prepared->visibility, prepared->surveyed.survey);
   prepared->patch_edge = patch_edge(texel_edge, area, max_patches);
   prepared->patches = make_patches(surfaces, *prepared->visibility, {prepared->patch_edge, max_patches, stop});
+  prepared->reached_backs = find_reached_backs(surfaces, prepared->patches, *prepared->visibility, stop);
   if (stop.stop_requested()) return cancelled;
 
   BakePlan& plan = prepared->plan;

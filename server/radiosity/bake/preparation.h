@@ -25,7 +25,8 @@ struct Preparation {
   std::optional<Atlas> atlas;             ///< where lightmaps are wanted
   std::optional<VertexGroups> groups;     ///< where light by vertex is wanted
   Patches patches;
-  double patch_edge = 0;  ///< wanted length of a patch's side, scene units
+  std::vector<std::uint8_t> reached_backs;  ///< [patches], of find_reached_backs()
+  double patch_edge = 0;                    ///< wanted length of a patch's side, scene units
   BakePlan plan;
 
   /// 3 where a tinted sheet stops channels by different shares: each then has rows of its own.

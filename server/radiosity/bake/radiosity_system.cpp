@@ -199,7 +199,7 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
   const bool is_streamed = prepared.plan.transport == Transport::kStreamed;
   std::vector<TakenRow> rows(patches.size());
   sample_patches(
-      *system->sampler, patches.num_cells(),
+      *system->sampler, patches.num_cells(), prepared.reached_backs,
       [&](std::uint32_t patch, FormFactorRow& row, const PatchSample& sample) {
         rows[patch].length = static_cast<std::uint32_t>(row.entries.size());
         if (is_streamed) row.entries.clear();

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -66,14 +67,21 @@ class PatchSampler {
   std::uint64_t seed_;
   int channel_;  ///< of the opacity
   SobolPoints site_points_;
+  SobolPoints candidates_;  ///< for sites where light passes some of a patch
 };
 
-/// Samples all front patches, and those back patches that rows reach, and hands each to `take`.
+/// Which back patches light can reach: rays from them meet fronts, or other backs that are reached. A back that no row
+/// has met sends nothing, and is black to texels that see it: each is looked for by rays of its own, once, as the few
+/// rays of each row may miss it. Shapes: [patches], 1: reached; fronts are not marked.
+std::vector<std::uint8_t> find_reached_backs(const Surfaces& surfaces, const Patches& patches,
+                                             const Visibility& visibility, const std::stop_token& stop);
+
+/// Samples all front patches, the `reached` backs, and other back patches that rows reach, and hands each to `take`.
 ///
 /// take(patch, row, sample) is called from any thread, once a patch; it may move the entries out of the row. Patches
 /// that no row reaches are not sampled. on_row is called after each row, from any thread, with the number of rows done
 /// and known to be needed. Stopped early, some are missing.
-void sample_patches(const PatchSampler& sampler, std::size_t num_fronts,
+void sample_patches(const PatchSampler& sampler, std::size_t num_fronts, std::span<const std::uint8_t> reached,
                     const std::function<void(std::uint32_t, FormFactorRow&, const PatchSample&)>& take,
                     const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row,
                     const std::stop_token& stop);

@@ -46,7 +46,7 @@ Result<SolveReport> solve_channels(Solver solver, const TransportOperator& trans
                             " patches unless asked for by name; this scene has " + std::to_string(transport.size()));
   }
   RADBAKE_CHECK_EQ(radiosity.size(), transport.size());
-  RADBAKE_CHECK(transport.is_reciprocal() || transport.is_by_columns() == reads_columns(solver));
+  RADBAKE_CHECK(transport.is_one_matrix() || transport.is_by_columns() == reads_columns(solver));
   SolveMonitor<C> monitor(solver, transport, problem, options, observe, std::move(stop));
   std::vector<C> unshot;
   switch (solver) {

@@ -10,8 +10,9 @@ namespace radbake::radiosity {
 DenseOperator::DenseOperator(const SparseOperator& sparse)
     : exchange_(sparse.size() * sparse.size(), 0),
       scale_(sparse.scaling().begin(), sparse.scaling().end()),
-      divisors_(sparse.areas().begin(), sparse.areas().end()),
-      areas_(divisors_),
+      divisors_(sparse.divisors().begin(), sparse.divisors().end()),
+      areas_(sparse.areas().begin(), sparse.areas().end()),
+      is_reciprocal_(sparse.is_reciprocal()),
       is_symmetric_(true) {
   for (std::uint32_t i = 0; i < areas_.size(); ++i) {
     const SparseOperator::ExchangeRow entries = sparse.exchange_row(i);

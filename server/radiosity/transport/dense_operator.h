@@ -26,6 +26,7 @@ class DenseOperator final : public TransportOperator {
   Vec3 gather_at(std::uint32_t i, std::span<const Vec3> radiosity) const override { return gathered(i, radiosity); }
   double gather_at(std::uint32_t i, std::span<const double> radiosity) const override { return gathered(i, radiosity); }
   double row_sum(std::uint32_t i) const override;
+  bool is_reciprocal() const override { return is_reciprocal_; }
   std::size_t row_length(std::uint32_t i) const override { return row_lengths_[i]; }
   std::span<const double> areas() const override { return areas_; }
 
@@ -41,6 +42,7 @@ class DenseOperator final : public TransportOperator {
   std::vector<double> divisors_;            ///< areas, or 1
   std::vector<std::uint32_t> row_lengths_;  ///< entries that are not zero by structure
   std::vector<double> areas_;
+  bool is_reciprocal_ = true;
   bool is_symmetric_ = false;  ///< S is: a column can be read along a row
 };
 

@@ -46,6 +46,8 @@ class TransportOperator {
 
   /// Whether A_i F_ij = A_j F_ji, up to rounding, may be relied on.
   virtual bool is_reciprocal() const { return true; }
+  /// Whether rows and columns are of one matrix, bit for bit.
+  virtual bool is_one_matrix() const { return true; }
   /// Whether the matrix is known by its columns only: gather_at() and row() are then not of it, gather() and column()
   /// are, and what bounds an error is that sum_i A_i F_ij <= A_j.
   virtual bool is_by_columns() const { return false; }

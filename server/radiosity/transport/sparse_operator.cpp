@@ -11,6 +11,8 @@ namespace {
 constexpr std::size_t kRowsPerTask = 256;
 /// Scaling ends when every row sum is right to this, or has stopped getting better.
 constexpr int kMaxScalingSweeps = 500;
+/// Rows are scaled by themselves where the symmetric scaling leaves one off by more than this.
+constexpr double kRowsByThemselves = 1e-9;
 
 template <typename Body>
 void for_each_row(std::size_t n, const Body& body) {
@@ -153,16 +155,13 @@ void SparseOperator::restore_row_sums(const EstimatedRows& rows, const std::stop
   }
   if (stop.stop_requested()) return;
 
-  // Where no scaling fits, rows may be left above 1, and reflect more than they get. Taking d_i down by the excess
-  // takes all rows down, so one pass is enough.
-  constexpr double kRounding = 1e-12;
-  bool is_limited = false;
+  repair_.repaired_row_error_max = worst;
+  divisors_ = areas_;
+  if (worst <= std::max(tolerance, kRowsByThemselves)) return;
   for (std::size_t i = 0; i < n; ++i) {
-    if (!(target[i] > 0) || sums[i] <= areas_[i] * (1 + kRounding)) continue;
-    scale_[i] *= areas_[i] / sums[i];
-    is_limited = true;
+    if (target[i] > 0 && sums[i] > 0) divisors_[i] = areas_[i] * sums[i] / target[i];
   }
-  repair_.repaired_row_error_max = is_limited ? measure(false) : worst;
+  is_reciprocal_ = false;
 }
 
 SparseOperator::ExchangeRow SparseOperator::exchange_row(std::uint32_t i) const {
@@ -177,20 +176,20 @@ void SparseOperator::row(std::uint32_t i, std::vector<std::uint32_t>& patches,
   form_factors.clear();
   for (std::size_t k = 0; k < patches.size(); ++k) {
     const double exchange = scale_[i] * scale_[patches[k]] * entries.exchange[k];
-    form_factors.push_back(areas_[i] > 0 ? exchange / areas_[i] : 0);
+    form_factors.push_back(divisors_[i] > 0 ? exchange / divisors_[i] : 0);
   }
 }
 
 void SparseOperator::column(std::uint32_t j, std::vector<std::uint32_t>& patches,
                             std::vector<double>& form_factors) const {
-  // S is symmetric, so column j has the entries of row j: F_ij = d_i S_ji d_j / A_i.
+  // S is symmetric, so column j has the entries of row j: F_ij = d_i S_ji d_j / q_i.
   const ExchangeRow entries = exchange_row(j);
   patches.assign(entries.patches.begin(), entries.patches.end());
   form_factors.resize(patches.size());
   for (std::size_t k = 0; k < patches.size(); ++k) {
     const std::uint32_t i = patches[k];
     const double exchange = scale_[i] * scale_[j] * entries.exchange[k];
-    form_factors[k] = areas_[i] > 0 ? exchange / areas_[i] : 0;
+    form_factors[k] = divisors_[i] > 0 ? exchange / divisors_[i] : 0;
   }
 }
 
@@ -206,11 +205,11 @@ C SparseOperator::gathered(std::uint32_t i, std::span<const C> radiosity) const 
   for (std::size_t k = 0, length = entries.patches.size(); k < length; ++k) {
     sum += values[patches[k]] * (exchange[k] * scale[patches[k]]);
   }
-  return areas_[i] > 0 ? sum * (scale_[i] / areas_[i]) : C{};
+  return divisors_[i] > 0 ? sum * (scale_[i] / divisors_[i]) : C{};
 }
 template double SparseOperator::gathered(std::uint32_t, std::span<const double>) const;
 template Vec3 SparseOperator::gathered(std::uint32_t, std::span<const Vec3>) const;
 
-double SparseOperator::row_sum(std::uint32_t i) const { return areas_[i] > 0 ? scaled_row(i) / areas_[i] : 0; }
+double SparseOperator::row_sum(std::uint32_t i) const { return divisors_[i] > 0 ? scaled_row(i) / divisors_[i] : 0; }
 
 }  // namespace radbake::radiosity

@@ -28,10 +28,11 @@ struct TransportRepair {
 ///   S_ij = (w_ij + w_ji) / (N_i / A_i + N_j / A_j)          w: rays that arrived, N: rays of the row
 ///
 /// A symmetric scaling F_ij = d_i S_ij d_j / A_i then restores the measured row sums r_i = 1 - (escaped +
-/// absorbed)/N_i: exactly where such a scaling exists (closed scenes), else as near as its fixed point comes. No row is
-/// left with more than 1, so that no reflectance below 1 diverges.
-/// Cost: O(entries) memory, 8 bytes each; O(entries) a scaling sweep.
-/// Source: Knight, Ruiz & Ucar 2014 (symmetric scaling); van Leersum 1989 (why row sums and reciprocity both matter).
+/// absorbed)/N_i: exactly where such a scaling exists (closed scenes), else as near as its fixed point comes. Rows that
+/// it leaves with other sums (few rays tell of impossible exchanges) are then scaled by themselves, and the matrix is
+/// not reciprocal there: a row that passes on more than it gets diverges, one that passes on less darkens what it
+/// lights. Cost: O(entries) memory, 8 bytes each; O(entries) a scaling sweep. Source: Knight, Ruiz & Ucar 2014
+/// (symmetric scaling); van Leersum 1989 (why row sums and reciprocity both matter).
 class SparseOperator final : public TransportOperator {
  public:
   /// Row sums that are off by rounding only; sweeps end there.
@@ -48,8 +49,10 @@ class SparseOperator final : public TransportOperator {
     std::span<const float> exchange;
   };
   ExchangeRow exchange_row(std::uint32_t i) const;
-  /// d of F_ij = d_i S_ij d_j / A_i. Shapes: [n].
+  /// d of F_ij = d_i S_ij d_j / q_i. Shapes: [n].
   std::span<const double> scaling() const { return scale_; }
+  /// q of F_ij = d_i S_ij d_j / q_i: A_i, but where a row was scaled by itself. Shapes: [n].
+  std::span<const double> divisors() const { return divisors_; }
 
   void row(std::uint32_t i, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
   void column(std::uint32_t j, std::vector<std::uint32_t>& patches, std::vector<double>& form_factors) const override;
@@ -58,6 +61,7 @@ class SparseOperator final : public TransportOperator {
   double row_sum(std::uint32_t i) const override;
   std::size_t row_length(std::uint32_t i) const override { return first_[i + 1] - first_[i]; }
   std::span<const double> areas() const override { return areas_; }
+  bool is_reciprocal() const override { return is_reciprocal_; }
 
  private:
   void pair_estimates(const EstimatedRows& rows, const std::stop_token& stop);
@@ -71,6 +75,8 @@ class SparseOperator final : public TransportOperator {
   std::vector<float> exchange_;  ///< S_ij
   std::vector<double> scale_;    ///< d_i
   std::vector<double> areas_;
+  std::vector<double> divisors_;  ///< q_i
+  bool is_reciprocal_ = true;
   TransportRepair repair_;
 };
 

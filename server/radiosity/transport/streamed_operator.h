@@ -50,6 +50,7 @@ class StreamedOperator final : public TransportOperator {
   std::size_t row_length(std::uint32_t i) const override { return sums_.lengths[i]; }
   std::span<const double> areas() const override { return sums_.areas; }
   bool is_reciprocal() const override { return false; }
+  bool is_one_matrix() const override { return false; }
   bool is_by_columns() const override { return system_ == StreamedSystem::kByColumns; }
   std::size_t rows_per_task() const override { return 4; }
 

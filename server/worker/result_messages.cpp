@@ -183,6 +183,10 @@ v1::PassReport to_message(const radiosity::PassSummary& pass) {
   out.set_relative_rmse(pass.relative_rmse);
   out.set_interval_low(pass.interval_low);
   out.set_interval_high(pass.interval_high);
+  out.set_gathered_scale(pass.scale.gathered);
+  out.set_direct_scale(pass.scale.direct);
+  out.set_refines_patches(pass.scale.refines_patches);
+  out.set_is_partial(!pass.is_whole);
   return out;
 }
 

@@ -3,15 +3,6 @@
 #include <gtest/gtest.h>
 
 namespace radbake::tests {
-namespace {
-
-class SilentObserver final : public radiosity::BakeObserver {
- public:
-  void on_progress(const radiosity::BakeProgress&) override {}
-  void on_tile(const radiosity::Tile&) override {}
-};
-
-}  // namespace
 
 radiosity::BakeOutcome baked(const Scene& scene, const radiosity::BakeOptions& options) {
   SilentObserver observer;

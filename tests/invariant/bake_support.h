@@ -4,6 +4,13 @@
 
 namespace radbake::tests {
 
+/// Ignores what a bake tells.
+class SilentObserver final : public radiosity::BakeObserver {
+ public:
+  void on_progress(const radiosity::BakeProgress&) override {}
+  void on_tile(const radiosity::Tile&) override {}
+};
+
 /// Bakes, and fails the test with the error's message where that fails.
 radiosity::BakeOutcome baked(const Scene& scene, const radiosity::BakeOptions& options);
 

@@ -169,8 +169,8 @@ Scene box_on_floor(bool is_double_sided, double sunk, bool is_cut) {
 }
 
 TEST(BoxOnTheFloor, LeavesNoHalo) {
-  // Both maps are estimates: with these rays a texel's standard error is about 0.3 %, at the contact 0.5 %, and the worst
-  // of two thousand differences is about four times that.
+  // Both maps are estimates: with these rays a texel's standard error is about 0.3 %, at the contact 0.5 %, and the
+  // worst of two thousand differences is about four times that.
   constexpr int kRays = 4096, kAtlas = 96;
   constexpr double kAllowed = 0.02;
   const BakeOutcome reference = tests::baked(box_on_floor(false, 0, true), options_of(kAtlas, kRays));

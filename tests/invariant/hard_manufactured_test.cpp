@@ -11,22 +11,6 @@
 namespace radbake::tests {
 namespace {
 
-/// Mean of the closed form over a texel's footprint.
-double expected_irradiance(const Scene& scene, const SeededTexel& texel) {
-  const std::string& name = scene.meshes[texel.mesh].name;
-  if (name == "floor") return 1;
-  constexpr int kPoints = 8;
-  double sum = 0;
-  for (int i = 0; i < kPoints; ++i) {
-    for (int j = 0; j < kPoints; ++j) {
-      const double s = texel.s0 + (texel.s1 - texel.s0) * (i + 0.5) / kPoints;
-      const double t = texel.t0 + (texel.t1 - texel.t0) * (j + 0.5) / kPoints;
-      sum += 1 + (name == "wall" ? wall_to_floor(s, t) : ceiling_to_floor(s, t)) / 2;
-    }
-  }
-  return sum / (kPoints * kPoints);
-}
-
 struct Method {
   std::string name;
   double reflectance;
@@ -78,7 +62,7 @@ TEST_P(ManufacturedRoom, IsFlatWithinThreeStandardErrors) {
   std::vector<double> expected;
   for (const SeededTexel& texel : bakes.texels) {
     values.push_back(texel.values);
-    expected.push_back(expected_irradiance(scene, texel));
+    expected.push_back(manufactured_irradiance(scene, texel));
   }
   const Distances off = distances(values, expected, kTexture);
   // Neighbours share the patches' noise, so the share is known to about 0.5 %; noise differs over a face by a factor

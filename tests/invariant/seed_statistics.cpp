@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/invariant/bake_support.h"
+#include "tests/scenes/cube_rooms.h"
 
 namespace radbake::tests {
 
@@ -17,6 +18,21 @@ Seeded seeded(const std::vector<double>& values) {
   for (const double v : values) squares += (v - result.mean) * (v - result.mean);
   result.standard_error = std::sqrt(squares / (n - 1) / n);
   return result;
+}
+
+double manufactured_irradiance(const Scene& scene, const SeededTexel& texel) {
+  const std::string& name = scene.meshes[texel.mesh].name;
+  if (name == "floor") return 1;
+  constexpr int kPoints = 8;
+  double sum = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    for (int j = 0; j < kPoints; ++j) {
+      const double s = texel.s0 + (texel.s1 - texel.s0) * (i + 0.5) / kPoints;
+      const double t = texel.t0 + (texel.t1 - texel.t0) * (j + 0.5) / kPoints;
+      sum += 1 + (name == "wall" ? wall_to_floor(s, t) : ceiling_to_floor(s, t)) / 2;
+    }
+  }
+  return sum / (kPoints * kPoints);
 }
 
 SeededBakes bake_with_seeds(const Scene& scene, radiosity::BakeOptions options) {
@@ -36,9 +52,12 @@ SeededBakes bake_with_seeds(const Scene& scene, radiosity::BakeOptions options) 
         if (s0 < -(1 - kPart) * ds || s0 > 1 - kPart * ds || t0 < -(1 - kPart) * dt || t0 > 1 - kPart * dt) return;
         if (seed == 0) {
           bakes.texels.push_back(
-              {m, std::max(0.0, s0), std::min(1.0, s0 + ds), std::max(0.0, t0), std::min(1.0, t0 + dt), {}});
+              {m, std::max(0.0, s0), std::min(1.0, s0 + ds), std::max(0.0, t0), std::min(1.0, t0 + dt), {}, {}});
         }
-        bakes.texels.at(at++).values.push_back(mean_component(rgb));
+        bakes.texels.at(at).values.push_back(mean_component(rgb));
+        const auto texel =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) + static_cast<std::size_t>(x);
+        bakes.texels.at(at++).errors.push_back(outcome.layers.back().values[4 * texel]);
       });
     }
     EXPECT_EQ(at, bakes.texels.size());

@@ -22,7 +22,11 @@ struct SeededTexel {
   std::size_t mesh = 0;
   double s0 = 0, s1 = 0, t0 = 0, t1 = 0;  ///< its footprint in shares of the quad's sides, within 0..1
   std::vector<double> values;             ///< [kSeeds] mean of the channels, lx
+  std::vector<double> errors;             ///< [kSeeds] standard error that the bake states, first channel, lx
 };
+
+/// Irradiance of a texel of manufactured_room(), lx: mean of the closed form over its footprint.
+double manufactured_irradiance(const Scene& room, const SeededTexel& texel);
 
 struct SeededBakes {
   std::vector<SeededTexel> texels;

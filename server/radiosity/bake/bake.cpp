@@ -142,8 +142,9 @@ class Bake {
   /// What row sums and solutions may be off by: well below what sampling leaves, where there are targets. What rows are
   /// off by counts 1 / (1 - rho) times.
   double tolerance() const {
-    constexpr double kSmall = 1e-3;
-    return is_progressive() ? kSmall * std::max(1 - prepared_.plan.survey.max_reflectance, 0.01) : 0;
+    constexpr double kMost = 1e-3, kShareOfTarget = 0.05;
+    const double wanted = options_.max_error > 0 ? std::min(kMost, kShareOfTarget * options_.max_error) : kMost;
+    return is_progressive() ? wanted * std::max(1 - prepared_.plan.survey.max_reflectance, 0.01) : 0;
   }
 
   /// What filling, levelling and writing may take after the last pass, wall seconds.
@@ -185,6 +186,7 @@ class Bake {
     results_.error = error.relative_rmse;
     results_.direct_sampling = error.direct_sampling;
     results_.gathered_sampling = error.gathered_sampling;
+    results_.direct_deviation = lightmaps_ ? error.direct_deviation : 0;
     results_.discretisation = error.discretisation;
     results_.algebraic = error.algebraic;
     ++results_.num_passes;
@@ -208,7 +210,7 @@ class Bake {
     if (lightmaps_) return estimate_error(*lightmaps_, algebraic);
     return estimate_error(
         vertices_->estimate(), [&](std::size_t g) { return vertices_->is_known()[g] != 0; },
-        [](std::size_t g) { return g; }, algebraic, 0);
+        [](std::size_t g) { return g; }, algebraic, vertices_->relative_spread());
   }
 
   /// The replicates of the patches' light: several where rows are sampled.
@@ -318,7 +320,7 @@ class Bake {
     const std::vector<HemisphereEstimator> of_nodes = estimators(settings.rays_per_node);
     const double dark = darkness_of(light);
     const auto scene_of = [&](const std::vector<HemisphereEstimator>& rows) {
-      return GatherScene{surfaces_, prepared_.shadows(),        rows[0],     direct, sent, surfaces_.sky,
+      return GatherScene{surfaces_, prepared_.shadows(),        rows[0], direct, sent, surfaces_.sky,
                          seed,      std::span(rows).subspan(1), dark};
     };
     const GatherScene alone = scene_of(of_texels), nodes = scene_of(of_nodes);
@@ -342,8 +344,9 @@ class Bake {
           stop_, [&] { return index > 0 && is_over(); }, counts);
     }
     if (vertices_) {
+      // Few receivers: their rays cost little beside the rows'.
       vertices_->add_pass(
-          alone, settings.light_samples, settings.gathered_weight,
+          asks_for_result(options_) ? nodes : alone, settings.light_samples, settings.gathered_weight,
           [&](std::uint64_t done) {
             progress_.report(BakeStage::kGathering, prepared_.plan.num_texels + done, num_receivers);
           },

@@ -77,7 +77,7 @@ std::vector<float> discretisation_squares(const LightmapGather& gather) {
 LightError estimate_error(const LightEstimate& estimate, const std::function<bool(std::size_t)>& counts,
                           const std::function<std::size_t(std::size_t)>& cell_of, double algebraic_bound,
                           double spread) {
-  double light = 0, direct = 0, gathered = 0, discrete = 0;
+  double light = 0, direct = 0, gathered = 0, discrete = 0, deviations = 0;
   LightError out;
   for (std::size_t i = 0; i < estimate.size(); ++i) {
     if (!counts(i)) continue;
@@ -85,6 +85,7 @@ LightError estimate_error(const LightEstimate& estimate, const std::function<boo
     light += mean_component(estimate.irradiance(i));
     direct += mean_component(estimate.direct_variance(i));
     gathered += mean_component(estimate.gathered_variance(i));
+    deviations += std::sqrt(mean_component(estimate.direct_variance(i)) * estimate.direct_weight(i));
     const std::size_t cell = cell_of(i);
     discrete += squared(kPatchShare) * estimate.patch_square(cell) + estimate.interpolation_square(cell);
   }
@@ -95,6 +96,9 @@ LightError estimate_error(const LightEstimate& estimate, const std::function<boo
   out.direct_sampling = relative(direct);
   out.gathered_sampling = relative(gathered);
   out.sampling = relative(direct + gathered);
+  // The root of a variance from four values is small by this in the mean.
+  constexpr double kRootOfFour = 0.9213;
+  out.direct_deviation = deviations / num / kRootOfFour / out.mean_irradiance;
   out.discretisation = relative(discrete);
   out.algebraic = algebraic_bound / out.mean_irradiance;
   const double fixed = squared(out.algebraic);

@@ -25,8 +25,9 @@ struct LightError {
   double relative_rmse = 0, low = 0, high = 0;
   double sampling = 0, discretisation = 0, algebraic = 0;
   double direct_sampling = 0, gathered_sampling = 0;  ///< parts of sampling, of the same kind
-  double mean_irradiance = 0;                         ///< of the receivers that count, lx
-  std::uint64_t num_receivers = 0;                    ///< that count
+  double direct_deviation = 0;      ///< of one shadow sample, mean over receivers: more where light is hard to find
+  double mean_irradiance = 0;       ///< of the receivers that count, lx
+  std::uint64_t num_receivers = 0;  ///< that count
 };
 
 /// Of what patches twice as large would change, the share that those of the size at hand are off by: between 1/3 where

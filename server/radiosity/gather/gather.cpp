@@ -375,7 +375,8 @@ bool LightmapGather::add_pass(const GatherPass& pass, const std::function<void(c
   for (const GatherCounts& tile : of_tile) counts += tile;
   if (stop.stop_requested()) return false;
   estimate_.end_pass();
-  note_spread(pass.weight, counts.squares, pass.alone.rows.replicates());
+  spread_.add_pass(pass.weight,
+                   std::span(counts.squares).first(static_cast<std::size_t>(pass.alone.rows.replicates())));
   return std::find(is_left_out.begin(), is_left_out.end(), 1) == is_left_out.end();
 }
 
@@ -385,19 +386,6 @@ GatherCounts& GatherCounts::operator+=(const GatherCounts& other) {
   num_gathered += other.num_gathered;
   for (std::size_t r = 0; r < squares.size(); ++r) squares[r] += other.squares[r];
   return *this;
-}
-
-void LightmapGather::note_spread(double weight, const std::array<double, kMaxReplicates>& squares, int replicates) {
-  double mean = 0, variance = 0;
-  for (int r = 0; r < replicates; ++r) mean += squares[static_cast<std::size_t>(r)] / replicates;
-  for (int r = 0; r < replicates; ++r) {
-    const double off = squares[static_cast<std::size_t>(r)] - mean;
-    variance += replicates > 1 ? off * off / (replicates - 1) : 0;
-  }
-  // The squares of a weighted mean's parts add up, and so do their variances.
-  const double share = weight / (total_weight_ += weight), part = share * share, rest = (1 - share) * (1 - share);
-  spread_mean_ = rest * spread_mean_ + part * mean;
-  spread_deviation_ = std::hypot(rest * spread_deviation_, part * std::sqrt(variance));
 }
 
 double LightmapGather::mean_irradiance() const {

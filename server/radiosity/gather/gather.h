@@ -68,7 +68,7 @@ class LightmapGather {
   /// What passes so far gathered from patches does not count any more; direct light does.
   void forget_gathered() {
     estimate_.forget_gathered();
-    total_weight_ = 0;
+    spread_.forget();
   }
 
   const Atlas& atlas() const { return atlas_; }
@@ -84,9 +84,7 @@ class LightmapGather {
   bool has_light(std::size_t cell) const { return cell_has_light_[cell] != 0; }
   /// Of valid texels, weighted by area, mean of the channels, lx.
   double mean_irradiance() const;
-  /// Standard deviation over mean of the replicates' mean square distances from their mean, of gathered light: how much
-  /// such a square varies from one bake to the next.
-  double relative_spread() const { return spread_mean_ > 0 ? spread_deviation_ / spread_mean_ : 0; }
+  double relative_spread() const { return spread_.relative(); }
 
  private:
   /// What the nodes of one pass found.
@@ -104,7 +102,6 @@ class LightmapGather {
                     Scratch& scratch, NodeLight* node);
   void gather_between(const GatherPass& pass, const std::vector<NodeLight>& nodes, const TexelRoles::Between& between,
                       int x, int y, Scratch& scratch);
-  void note_spread(double weight, const std::array<double, kMaxReplicates>& squares, int replicates);
   int light_samples_of(const GatherPass& pass, std::size_t texel) const;
 
   const Surfaces& surfaces_;
@@ -114,7 +111,7 @@ class LightmapGather {
   LightEstimate estimate_;
   std::vector<TexelFacts> facts_;             ///< [texels]
   std::vector<std::uint8_t> cell_has_light_;  ///< [cells]
-  double total_weight_ = 0, spread_mean_ = 0, spread_deviation_ = 0;
+  ReplicateSpread spread_;
 };
 
 }  // namespace radbake::radiosity

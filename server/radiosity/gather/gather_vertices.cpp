@@ -84,6 +84,7 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
   const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
   const SobolPoints site_points(scene.rows.num_sites() / scene.rows.replicates());
   std::atomic<std::uint64_t> num_done = 0, num_rays = 0, num_light_rays = 0;
+  std::vector<std::array<float, kMaxReplicates>> squares(groups_.size());
   estimate_.begin_pass(weight);
   for_each_range(groups_.size(), kGroupsPerTask, [&](std::size_t begin, std::size_t end) {
     Scratch scratch;
@@ -119,6 +120,10 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
       }
       const MeanAndVariance sent = mean_and_variance(std::span(direct).first(num_replicates));
       const MeanAndVariance arrived = mean_and_variance(std::span(gathered).first(num_replicates));
+      for (std::size_t r = 0; r < num_replicates; ++r) {
+        const Vec3 off = gathered[r] - arrived.mean;
+        squares[g][r] = static_cast<float>(mean_component(scaled_by(off, off)));
+      }
       estimate_.add(g, {sent.mean, arrived.mean, sent.variance, arrived.variance, {}, 0}, light_samples);
       estimate_.add_to_cell(g, mean_square_without_noise(std::span(coarser).first(num_replicates)), 0);
     }
@@ -126,6 +131,11 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
     if (on_done) on_done(num_done);
   });
   estimate_.end_pass();
+  std::array<double, kMaxReplicates> sums{};
+  for (const auto& own : squares) {
+    for (std::size_t r = 0; r < num_replicates; ++r) sums[r] += own[r];
+  }
+  spread_.add_pass(weight, std::span(sums).first(num_replicates));
   counts.num_rays += num_rays;
   counts.num_light_rays += num_light_rays;
   counts.num_gathered += groups_.size();

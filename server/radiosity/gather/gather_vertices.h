@@ -22,9 +22,13 @@ class VertexGather {
                 const std::function<void(std::uint64_t)>& on_done, std::stop_token stop, GatherCounts& counts);
 
   /// As LightmapGather::forget_gathered().
-  void forget_gathered() { estimate_.forget_gathered(); }
+  void forget_gathered() {
+    estimate_.forget_gathered();
+    spread_.forget();
+  }
 
   const LightEstimate& estimate() const { return estimate_; }
+  double relative_spread() const { return spread_.relative(); }
   /// [groups] Whether a group is not buried.
   const std::vector<std::uint8_t>& is_known() const { return is_known_; }
 
@@ -33,6 +37,7 @@ class VertexGather {
   const VertexGroups& groups_;
   LightEstimate estimate_;
   std::vector<std::uint8_t> is_known_;
+  ReplicateSpread spread_;
 };
 
 /// Light by vertex group. Shapes: irradiance [groups], lx.

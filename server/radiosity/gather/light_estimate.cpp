@@ -1,6 +1,6 @@
 #include "server/radiosity/gather/light_estimate.h"
 
-#include "common/base/check.h"
+#include <cmath>
 
 namespace radbake::radiosity {
 namespace {
@@ -44,6 +44,18 @@ double mean_square_without_noise(std::span<const Vec3> replicates) {
     squares += scaled_by(x, x);
   }
   return mean_component(scaled_by(sum, sum) - squares) / (num * (num - 1));
+}
+
+void ReplicateSpread::add_pass(double weight, std::span<const double> squares) {
+  const auto num = static_cast<double>(squares.size());
+  double mean = 0, variance = 0;
+  for (const double square : squares) mean += square / num;
+  for (const double square : squares)
+    variance += squares.size() > 1 ? (square - mean) * (square - mean) / (num - 1) : 0;
+  // The squares of a weighted mean's parts add up, and so do their variances.
+  const double share = weight / (weight_ += weight), part = share * share, rest = (1 - share) * (1 - share);
+  mean_ = rest * mean_ + part * mean;
+  deviation_ = std::hypot(rest * deviation_, part * std::sqrt(variance));
 }
 
 LightEstimate::LightEstimate(std::size_t num_receivers, std::size_t num_cells, bool has_reflected, bool has_openness)

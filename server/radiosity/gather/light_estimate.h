@@ -27,6 +27,20 @@ MeanAndVariance mean_and_variance(std::span<const Vec3> replicates);
 /// estimate, without the square of their noise. May be negative.
 double mean_square_without_noise(std::span<const Vec3> replicates);
 
+/// How much the replicates' mean square distances from their mean vary, of the light that all passes gathered: how much
+/// such a square varies from one bake to the next.
+class ReplicateSpread {
+ public:
+  /// `squares`: of each replicate, summed over the receivers of one pass; weight as the pass's gathered light.
+  void add_pass(double weight, std::span<const double> squares);
+  void forget() { weight_ = 0; }
+  /// Standard deviation over mean.
+  double relative() const { return mean_ > 0 ? deviation_ / mean_ : 0; }
+
+ private:
+  double weight_ = 0, mean_ = 0, deviation_ = 0;
+};
+
 /// The light of many receivers (texels of stacked sheets, groups of vertices) as the weighted mean of passes.
 ///
 ///   mean = sum w_p x_p / sum w_p        variance = sum w_p^2 v_p / (sum w_p)^2

@@ -77,7 +77,12 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
   // Efforts with the least cost.
   const double direct_cost = results.direct_rays / results.direct_effort;
   const double gathered_cost = kRayCost * results.gathered_rays / results.gathered_effort;
-  const double direct_part = direct * results.direct_effort, gathered_part = gathered * results.gathered_effort;
+  // Where texels share samples out by their deviations s, mean(s)^2 / n is left of n samples each (Neyman 1934).
+  double direct_part = direct * results.direct_effort;
+  if (results.direct_deviation > 0) {
+    direct_part = std::min(direct_part, squared(results.direct_deviation) / kLightSamples);
+  }
+  const double gathered_part = gathered * results.gathered_effort;
   const double root = std::sqrt(direct_part * direct_cost) + std::sqrt(gathered_part * gathered_cost);
   double direct_effort = direct_cost > 0 ? std::sqrt(direct_part / direct_cost) * root / allowed : 0;
   const double gathered_kept = refines ? 0 : results.gathered_effort;

@@ -31,6 +31,7 @@ struct PassScale {
 struct PassResults {
   double error = 0;  ///< estimated relative RMSE, all parts
   double direct_sampling = 0, gathered_sampling = 0, discretisation = 0, algebraic = 0;
+  double direct_deviation = 0;                    ///< of one shadow sample, mean over texels that adapt; 0: they do not
   double direct_effort = 0, gathered_effort = 0;  ///< scales of all passes so far, added up
   double direct_rays = 0, gathered_rays = 0;      ///< of all passes so far, added up
   int num_passes = 0;

@@ -1,5 +1,6 @@
 #include "server/radiosity/form_factor/hemisphere.h"
 
+#include <algorithm>
 #include <array>
 
 namespace radbake::radiosity {
@@ -8,6 +9,31 @@ namespace {
 /// Sites that share a texel's or patch's rays at most; each then has at least eight rays to tell whether it is buried.
 constexpr int kMaxSites = 64;
 constexpr int kRaysPerSite = 8;
+
+/// Inside of something closed up to one ray in so many gets out: where surfaces cross or do not meet.
+constexpr std::uint64_t kLeak = 64;
+/// Surfaces of which is looked whether they are inside too.
+constexpr std::size_t kMostLooks = 32;
+
+/// Closes the gaps that the rays of buried sites leave.
+void take_back_buried(RowSample& row) {
+  std::uint32_t num_arrivals = 0, num_escapes = 0;
+  for (std::size_t s = 0; s < row.of_site.size(); ++s) {
+    RowSample::SiteRays& own = row.of_site[s];
+    if (row.is_buried[s]) {
+      own = {};
+      continue;
+    }
+    std::copy_n(row.arrivals.begin() + own.first_arrival, own.num_arrivals, row.arrivals.begin() + num_arrivals);
+    std::copy_n(row.escapes.begin() + own.first_escape, own.escaped, row.escapes.begin() + num_escapes);
+    own.first_arrival = num_arrivals;
+    own.first_escape = num_escapes;
+    num_arrivals += own.num_arrivals;
+    num_escapes += own.escaped;
+  }
+  row.arrivals.resize(num_arrivals);
+  row.escapes.resize(num_escapes);
+}
 
 }  // namespace
 
@@ -73,6 +99,49 @@ void HemisphereEstimator::sample_again(std::span<const Site> sites, Scratch& scr
   row.traced = traced;
 }
 
+bool HemisphereEstimator::is_enclosing(const Hit& hit, const Patches::Meeting& met) const {
+  // Who is under a sheet that light passes is not inside of anything.
+  return met.patch == kNoPatch && !surfaces_.is_see_through(hit.triangle);
+}
+
+bool HemisphereEstimator::has_way_out(const Scratch& scratch, std::span<const Hit> hits, const RowSample& row,
+                                      std::uint64_t counted) const {
+  // Collect what is neither a way out nor closed at first sight: surfaces that may be inside as well.
+  std::uint64_t escaped = 0;
+  std::vector<std::size_t> others;
+  std::size_t k = 0;
+  for (std::size_t s = 0; s < row.is_buried.size(); ++s) {
+    if (row.is_buried[s]) escaped += row.of_site[s].escaped;
+    for (; k < scratch.end_of_site[s]; ++k) {
+      if (!row.is_buried[s] || hits[k].triangle == kNoHit) continue;
+      if (!is_enclosing(hits[k], patches_.meet(hits[k], scratch.rays[k].direction, surfaces_))) others.push_back(k);
+    }
+  }
+  if (kLeak * escaped > counted) return true;
+
+  // Look from some of them along their normals.
+  const std::size_t num_looks = std::min(others.size(), kMostLooks);
+  std::vector<Ray> looks;
+  for (std::size_t look = 0; look < num_looks; ++look) {
+    const std::size_t ray = others[look * others.size() / num_looks];
+    const Hit& hit = hits[ray];
+    const auto& d = scratch.rays[ray].direction;
+    const Vec3 normal = surfaces_.normals[hit.triangle];
+    const Vec3 facing = dot(normal, {d[0], d[1], d[2]}) < 0 ? normal : -normal;
+    const Vec3 at = surfaces_.position({hit.triangle, static_cast<double>(hit.u), static_cast<double>(hit.v)});
+    looks.push_back({lifted_origin(surfaces_, at, facing, hit.triangle),
+                     {static_cast<float>(facing.x), static_cast<float>(facing.y), static_cast<float>(facing.z)}});
+  }
+  std::vector<Hit> met(num_looks);
+  visibility_.trace(looks, met);
+  std::uint64_t open = 0;
+  for (std::size_t look = 0; look < num_looks; ++look) {
+    const Hit& hit = met[look];
+    open += hit.triangle == kNoHit || !is_enclosing(hit, patches_.meet(hit, looks[look].direction, surfaces_));
+  }
+  return num_looks > 0 && kLeak * (escaped * num_looks + open * others.size()) > counted * num_looks;
+}
+
 void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& scratch, std::span<const Hit> hits,
                                    RowSample& row) const {
   row = {std::move(row.arrivals),  std::move(row.escapes), 0, 0, 0, 0,
@@ -81,17 +150,18 @@ void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& s
   row.is_buried.assign(sites.size(), 0);
   row.of_site.assign(sites.size(), {});
 
-  // Read off what each ray met, site by site: a buried site takes its rays back.
+  // Read off what each ray met, site by site.
   row.arrivals.resize(scratch.rays.size());
   std::uint32_t num_arrivals = 0;
-  std::size_t num_buried = 0, k = 0;
+  std::uint64_t counted = 0, free = 0;  // rays of all sites that are under something
+  std::size_t k = 0;
   constexpr std::size_t kAhead = 16;  // a large scene's triangles are not in the cache
   for (std::size_t s = 0; s < sites.size(); ++s) {
-    RowSample::SiteRays own;
+    RowSample::SiteRays& own = row.of_site[s];
     own.first_arrival = num_arrivals;
     own.first_escape = static_cast<std::uint32_t>(row.escapes.size());
     own.counted = static_cast<std::uint32_t>(scratch.end_of_site[s] - k);
-    std::uint32_t absorbed = 0, enclosing = 0;
+    std::uint32_t enclosing = 0;
     for (; k < scratch.end_of_site[s]; ++k) {
       const Hit& hit = hits[k];
       if (k + kAhead < hits.size() && hits[k + kAhead].triangle != kNoHit) {
@@ -105,28 +175,32 @@ void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& s
       own.near += hit.distance < near_distance_;
       const Patches::Meeting met = patches_.meet(hit, scratch.rays[k].direction, surfaces_);
       own.backs += met.is_back;
-      if (met.patch == kNoPatch) {
-        ++absorbed;
-        // Who is under a sheet that light passes is not inside of anything.
-        enclosing += !surfaces_.is_see_through(hit.triangle);
-      }
+      enclosing += is_enclosing(hit, met);
       row.arrivals[num_arrivals] = met.patch;
       num_arrivals += met.patch != kNoPatch;
     }
-    if (2 * enclosing > own.counted) {
-      row.is_buried[s] = 1;
-      ++num_buried;
-      num_arrivals = own.first_arrival;
-      row.escapes.resize(own.first_escape);
-      continue;
-    }
     own.num_arrivals = num_arrivals - own.first_arrival;
-    row.of_site[s] = own;
-    row.escaped += own.escaped;
-    row.absorbed += absorbed;
-    row.counted += own.counted;
+    if (2 * enclosing <= own.counted) continue;
+    row.is_buried[s] = 1;
+    counted += own.counted;
+    free += own.counted - enclosing;
   }
   row.arrivals.resize(num_arrivals);
+
+  // Sites that together see a way out are under something, not inside of it.
+  if (counted > 0 && kLeak * free > counted && has_way_out(scratch, hits, row, counted)) {
+    row.is_buried.assign(sites.size(), 0);
+  } else if (counted > 0) {
+    take_back_buried(row);
+  }
+  std::size_t num_buried = 0;
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    const RowSample::SiteRays& own = row.of_site[s];
+    num_buried += row.is_buried[s];
+    row.escaped += own.escaped;
+    row.absorbed += own.counted - own.escaped - own.num_arrivals;
+    row.counted += own.counted;
+  }
   row.visible_share = 1 - static_cast<double>(num_buried) / static_cast<double>(sites.size());
 }
 

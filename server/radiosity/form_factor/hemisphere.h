@@ -38,8 +38,9 @@ struct RowSample {
 ///   F_ij = 1/A_i int_i int_hemisphere cos(theta)/pi V_j(x, omega) d omega dA
 ///
 /// The rays of one row are a scrambled Sobol sequence over the hemisphere, dealt to the sites in runs. Hits,
-/// escapes and absorptions sum to the rays counted by construction. A site is *buried* when more than half of its rays
-/// meet the back of single-sided opaque surfaces: it lies inside other geometry, and its rays do not count. Rays about
+/// escapes and absorptions sum to the rays counted by construction. Sites of which more than half of the rays meet the
+/// back of single-sided opaque surfaces are *buried*, and their rays do not count, unless more than one in 64 of their
+/// rays together finds a way out: then they are not inside of anything, only under a sheet. Rays about
 /// an interpolated normal that leave below the surface are rejected and do not count either. Errors: variance of F_ij
 /// is at most F (1 - F) / rays. Source: Malley's method; the directions are those of CosineDirections.
 class HemisphereEstimator {
@@ -80,6 +81,12 @@ class HemisphereEstimator {
   void sample_again(std::span<const Site> sites, Scratch& scratch, RowSample& row) const;
 
  private:
+  /// Whether a ray met the back of something that is single-sided and stops light.
+  bool is_enclosing(const Hit& hit, const Patches::Meeting& met) const;
+  /// Whether more than one in kLeak of the rays of sites marked as buried gets into the open, or to a surface that
+  /// does not face the back of something in its turn, as those inside of solids that cross do. `counted`: those rays.
+  bool has_way_out(const Scratch& scratch, std::span<const Hit> hits, const RowSample& row,
+                   std::uint64_t counted) const;
   void read_off(std::span<const Site> sites, const Scratch& scratch, std::span<const Hit> hits, RowSample& row) const;
   void deal_rays(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch) const;
 

@@ -7,22 +7,15 @@
 
 #include "server/radiosity/bake/lightmap_layers.h"
 #include "server/radiosity/bake/on_threads.h"
-#include "server/radiosity/bake/patch_light.h"
+#include "server/radiosity/bake/pass_runner.h"
 #include "server/radiosity/bake/pilot.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
 #include "server/radiosity/error/light_error.h"
-#include "server/radiosity/gather/gather.h"
-#include "server/radiosity/gather/gather_vertices.h"
 #include "server/radiosity/plan/pass_plan.h"
 
 namespace radbake::radiosity {
 namespace {
-
-enum Purpose : std::uint64_t { kReplicate = 71, kPass = 72 };
-
-/// Where texels adapt, the most shadow rays one gets, over the mean.
-constexpr int kMostLightSamples = 16;
 
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
@@ -36,13 +29,8 @@ class Bake {
         surfaces_(prepared.surveyed.surfaces),
         progress_(progress),
         stop_(stop),
-        finish_(finish) {
-    if (prepared.atlas) {
-      lightmaps_.emplace(surfaces_, *prepared.atlas, prepared.shadows(), prepared.plan.spacing,
-                         options_.wants_direct || options_.wants_indirect, options_.wants_ao);
-    }
-    if (prepared.groups) vertices_.emplace(surfaces_, *prepared.groups);
-  }
+        finish_(finish),
+        passes_(prepared, progress, stop, finish, [this] { return is_over(); }) {}
 
   Result<BakeOutcome> run() {
     BakeReport& report = outcome_.report;
@@ -126,19 +114,6 @@ class Bake {
     return static_cast<std::size_t>(options_.max_patches > 0 ? options_.max_patches : kDefaultMaxRefinedPatches);
   }
 
-  /// Patches half as long a side, and nothing gathered from the larger ones.
-  void refine_patches() {
-    prepared_.patch_edge /= 2;
-    prepared_.patches =
-        make_patches(surfaces_, *prepared_.visibility, {prepared_.patch_edge, max_refined_patches(), stop_});
-    prepared_.reached_backs = find_reached_backs(surfaces_, prepared_.patches, *prepared_.visibility, stop_);
-    twice_as_large_.clear();
-    outcome_.report.num_patches = prepared_.patches.size();
-    if (lightmaps_) lightmaps_->forget_gathered();
-    if (vertices_) vertices_->forget_gathered();
-    results_.gathered_effort = results_.gathered_rays = 0;
-  }
-
   /// What row sums and solutions may be off by: well below what sampling leaves, where there are targets. What rows are
   /// off by counts 1 / (1 - rho) times.
   double tolerance() const {
@@ -150,17 +125,20 @@ class Bake {
   /// What filling, levelling and writing may take after the last pass, wall seconds.
   double seconds_to_complete() const {
     constexpr double kLeast = 0.03, kPerPixel = 0.3e-6;
-    return kLeast + (lightmaps_ ? kPerPixel * static_cast<double>(lightmaps_->facts().size()) : 0);
+    const auto& lightmaps = passes_.lightmaps();
+    return kLeast + (lightmaps ? kPerPixel * static_cast<double>(lightmaps->facts().size()) : 0);
   }
 
   /// The light of the patches, and the light that arrives from them.
   Result<void> run_pass(const PassSettings& settings, const PassScale& scale, double share_of_rest) {
-    if (scale.refines_patches) refine_patches();
+    if (scale.refines_patches) {
+      passes_.refine_patches(max_refined_patches());
+      outcome_.report.num_patches = prepared_.patches.size();
+      results_.gathered_effort = results_.gathered_rays = 0;
+    }
     if (stop_.stop_requested()) return cancelled();
     const int index = results_.num_passes;
     const double began = progress_.seconds();
-    const std::uint64_t seed =
-        index == 0 ? options_.seed : seed_of(options_.seed, kPass, static_cast<std::uint64_t>(index));
     const auto num_patches = static_cast<double>(prepared_.patches.num_cells());
     const auto num_receivers = static_cast<double>(prepared_.plan.num_texels + prepared_.plan.num_vertex_groups);
     progress_.begin_pass(index, share_of_rest, num_patches * (settings.rays_per_row + settings.patch_light_samples),
@@ -172,21 +150,17 @@ class Bake {
     summary.rays_per_row = settings.rays_per_row;
     summary.rays_per_texel = settings.rays_per_texel;
     summary.light_samples_per_texel = settings.light_samples;
-    auto light = solve_replicates(settings, seed, summary);
-    if (!light.ok() && light.error().code == ErrorCode::kCancelled && index > 0 && !stop_.stop_requested()) {
-      // The time was up before the pass had changed anything.
-      has_ended_early_ = true;
-      return {};
-    }
-    if (!light.ok()) return light.error();
-    if (!gather(settings, seed, *light, summary)) return cancelled();
-    has_ended_early_ = !summary.is_whole;
+    RADBAKE_ASSIGN_OR_RETURN(const auto rays, passes_.run({index, settings, tolerance()}, outcome_.report, summary));
+    has_ended_early_ = !rays || !summary.is_whole;
+    if (!rays) return {};
+    results_.gathered_rays += rays->gathered;
+    results_.direct_rays += rays->direct;
 
-    const LightError error = current_error();
+    const LightError error = passes_.error();
     results_.error = error.relative_rmse;
     results_.direct_sampling = error.direct_sampling;
     results_.gathered_sampling = error.gathered_sampling;
-    results_.direct_deviation = lightmaps_ ? error.direct_deviation : 0;
+    results_.direct_deviation = passes_.lightmaps() ? error.direct_deviation : 0;
     results_.discretisation = error.discretisation;
     results_.algebraic = error.algebraic;
     ++results_.num_passes;
@@ -205,179 +179,21 @@ class Bake {
     return {};
   }
 
-  LightError current_error() const {
-    const double algebraic = error_bound_;
-    if (lightmaps_) return estimate_error(*lightmaps_, algebraic);
-    return estimate_error(
-        vertices_->estimate(), [&](std::size_t g) { return vertices_->is_known()[g] != 0; },
-        [](std::size_t g) { return g; }, algebraic, vertices_->relative_spread());
-  }
-
-  /// The replicates of the patches' light: several where rows are sampled.
-  Result<std::vector<PatchLight>> solve_replicates(const PassSettings& settings, std::uint64_t seed,
-                                                   PassSummary& summary) {
-    // Later passes may be given up while nothing of them shows.
-    const bool is_first = results_.num_passes == 0;
-    std::stop_source end;
-    const std::stop_callback on_stop(stop_, [&] { end.request_stop(); });
-    const std::stop_callback on_finish(is_first ? std::stop_token{} : finish_, [&] { end.request_stop(); });
-    const std::stop_token stop = end.get_token();
-    BakeReport& report = outcome_.report;
-    const int num = num_replicates_of(report.plan.form_factors);
-    const auto total_num = static_cast<std::uint64_t>(num);
-    std::vector<ReplicateSystem> systems;
-    for (int r = 0; r < num; ++r) {
-      const auto index = static_cast<std::uint64_t>(r);
-      const SystemSettings own{seed_of(seed, kReplicate, index), settings.rays_per_row / num,
-                               settings.patch_light_samples / num, tolerance()};
-      const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
-        progress_.report(BakeStage::kFormFactors, total * index + done, total * total_num);
-        if (!is_first && is_over()) end.request_stop();
-      };
-      RADBAKE_ASSIGN_OR_RETURN(ReplicateSystem system, estimate_system(prepared_, own, on_row, stop));
-      summary.num_row_rays += system.report.num_row_rays;
-      summary.num_light_rays += system.report.num_light_rays;
-      systems.push_back(std::move(system));
-    }
-    progress_.report(BakeStage::kSolving, 0, 0);
-    results_.gathered_rays += static_cast<double>(summary.num_row_rays + summary.num_light_rays);
-    const auto on_step = [&](std::uint64_t steps, double bound) {
-      progress_.report(BakeStage::kSolving, steps, 0, bound);
-    };
-    std::vector<PatchLight> light;
-    for (ReplicateSystem& system : systems) {
-      RADBAKE_ASSIGN_OR_RETURN(PatchLight own, solve_patch_light(prepared_, system, on_step, stop));
-      own.coarser = averaged(own.radiosity);
-      light.push_back(std::move(own));
-    }
-    error_bound_ = 0;
-    for (const ReplicateSystem& system : systems)
-      error_bound_ = std::max(error_bound_, system.report.solver.error_bound);
-    report.num_row_rays += summary.num_row_rays;
-    report.num_light_rays += summary.num_light_rays;
-    if (results_.num_passes > 0) return light;
-    // Of several replicates and passes, the report shows the first.
-    const PatchLightReport& first = systems.front().report;
-    report.transport = first.transport;
-    report.solver = first.solver;
-    report.energy = first.energy;
-    report.warnings.insert(report.warnings.end(), first.warnings.begin(), first.warnings.end());
-    return light;
-  }
-
-  /// What counts as no light: what the solver cannot tell from 0, and a thousandth of what patches send in the mean.
-  /// A few rays that slip along a contact bring as much into what is closed.
-  double darkness_of(const std::vector<PatchLight>& light) const {
-    constexpr double kShare = 1e-3;
-    double flux = 0, area = 0;
-    for (std::uint32_t patch = 0; patch < light.front().radiosity.size(); ++patch) {
-      flux += prepared_.patches.area(patch) * max_component(light.front().radiosity[patch]);
-      area += prepared_.patches.area(patch);
-    }
-    return std::max(error_bound_, area > 0 ? kShare * flux / area : 0);
-  }
-
-  /// What patches twice as large would send: the mean of their parts, weighted by area.
-  std::vector<Vec3> averaged(const std::vector<Vec3>& radiosity) {
-    const Patches& patches = prepared_.patches;
-    if (twice_as_large_.empty()) twice_as_large_ = patches.twice_as_large();
-    std::vector<Vec3> flux(radiosity.size());
-    std::vector<double> area(radiosity.size(), 0);
-    for (std::uint32_t patch = 0; patch < radiosity.size(); ++patch) {
-      flux[twice_as_large_[patch]] += radiosity[patch] * patches.area(patch);
-      area[twice_as_large_[patch]] += patches.area(patch);
-    }
-    std::vector<Vec3> means;
-    means.reserve(radiosity.size());
-    for (std::uint32_t patch = 0; patch < radiosity.size(); ++patch) {
-      const std::uint32_t larger = twice_as_large_[patch];
-      means.push_back(area[larger] > 0 ? flux[larger] / area[larger] : radiosity[patch]);
-    }
-    return means;
-  }
-
-  /// The light of the patches -> one more pass of lightmaps and light by vertex; false when it was stopped.
-  bool gather(const PassSettings& settings, std::uint64_t seed, const std::vector<PatchLight>& light,
-              PassSummary& summary) {
-    std::vector<SentLight> sent;
-    for (int r = 0; r < kMaxReplicates; ++r) {
-      const PatchLight& own = light[static_cast<std::size_t>(r) % light.size()];
-      sent.push_back({own.radiosity, own.glow, own.coarser});
-    }
-    const bool adapts = lightmaps_ && results_.num_passes > 0;
-    const int most_samples = settings.light_samples * (adapts ? kMostLightSamples : 1);
-    const DirectLight direct(surfaces_, prepared_.shadows(), most_samples, Environment::Part::kBright);
-    const double ao_distance = options_.ao_distance > 0 ? options_.ao_distance : kDefaultAoDistance;
-    const auto estimators = [&](int rays) {
-      std::vector<HemisphereEstimator> of_channel;
-      for (int channel = 0; channel < prepared_.num_ray_channels(); ++channel) {
-        of_channel.emplace_back(surfaces_, prepared_.patches, prepared_.visibility->channel(channel), rays,
-                                options_.wants_ao ? ao_distance / surfaces_.metres_per_unit : 0, kMaxReplicates);
-      }
-      return of_channel;
-    };
-    const std::vector<HemisphereEstimator> of_texels = estimators(settings.rays_per_texel);
-    const std::vector<HemisphereEstimator> of_nodes = estimators(settings.rays_per_node);
-    const double dark = darkness_of(light);
-    const auto scene_of = [&](const std::vector<HemisphereEstimator>& rows) {
-      return GatherScene{surfaces_, prepared_.shadows(),        rows[0], direct, sent, surfaces_.sky,
-                         seed,      std::span(rows).subspan(1), dark};
-    };
-    const GatherScene alone = scene_of(of_texels), nodes = scene_of(of_nodes);
-    std::vector<std::uint8_t> levels;
-    if (adapts) levels = light_levels(*lightmaps_, settings.light_samples, most_samples);
-
-    const std::uint64_t num_receivers = prepared_.plan.num_texels + prepared_.plan.num_vertex_groups;
-    progress_.report(BakeStage::kGathering, 0, num_receivers);
-    GatherCounts counts;
-    if (lightmaps_) {
-      const Atlas& atlas = *prepared_.atlas;
-      const GatherPass pass{alone, nodes, settings.light_samples, levels, settings.gathered_weight};
-      const int index = results_.num_passes;
-      summary.is_whole = lightmaps_->add_pass(
-          pass,
-          [&](const GatheredTile& tile) {
-            progress_.tile({tile.sheet, index, tile.x, tile.y, tile.width, tile.height, 4, tile.rgba,
-                            lightmap_name(tile.sheet), atlas.width(), atlas.height()});
-            progress_.report(BakeStage::kGathering, tile.texels_done, num_receivers);
-          },
-          stop_, [&] { return index > 0 && is_over(); }, counts);
-    }
-    if (vertices_) {
-      // Few receivers: their rays cost little beside the rows'.
-      vertices_->add_pass(
-          asks_for_result(options_) ? nodes : alone, settings.light_samples, settings.gathered_weight,
-          [&](std::uint64_t done) {
-            progress_.report(BakeStage::kGathering, prepared_.plan.num_texels + done, num_receivers);
-          },
-          stop_, counts);
-    }
-    if (stop_.stop_requested()) return false;
-    summary.num_gather_rays = counts.num_rays;
-    summary.num_light_rays += counts.num_light_rays;
-    summary.num_gathered = counts.num_gathered;
-    outcome_.report.num_gather_rays += counts.num_rays;
-    outcome_.report.num_light_rays += counts.num_light_rays;
-    results_.gathered_rays += static_cast<double>(counts.num_rays);
-    results_.direct_rays += static_cast<double>(counts.num_light_rays);
-    return true;
-  }
-
   /// Fills and levels what the passes found, and tells what it is off by.
   void complete() {
     BakeReport& report = outcome_.report;
-    const LightError error = current_error();
+    const LightError error = passes_.error();
     tell_error(error);
-    if (lightmaps_) {
-      const std::vector<float> errors = standard_errors(*lightmaps_);
-      tell_worst(find_worst(*lightmaps_, errors, error.mean_irradiance));
-      report.energy.mean_irradiance = lightmaps_->mean_irradiance();
+    if (const auto& lightmaps = passes_.lightmaps()) {
+      const std::vector<float> errors = standard_errors(*lightmaps);
+      tell_worst(find_worst(*lightmaps, errors, error.mean_irradiance), lightmaps->atlas());
+      report.energy.mean_irradiance = lightmaps->mean_irradiance();
       report.lightmap =
-          append_layers(surfaces_, *lightmaps_, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
+          append_layers(surfaces_, *lightmaps, {options_.wants_direct, options_.wants_indirect, options_.wants_ao},
                         errors, outcome_.layers);
     }
     GatheredVertices vertices;
-    if (vertices_) vertices = finish_vertices(surfaces_, *prepared_.groups, *vertices_);
+    if (passes_.vertices()) vertices = finish_vertices(surfaces_, *prepared_.groups, *passes_.vertices());
     describe_meshes(vertices);
   }
 
@@ -395,8 +211,7 @@ class Bake {
     summary.num_texels = error.num_receivers;
   }
 
-  void tell_worst(const WorstPlace& place) {
-    const Atlas& atlas = lightmaps_->atlas();
+  void tell_worst(const WorstPlace& place, const Atlas& atlas) {
     const auto width = static_cast<std::size_t>(atlas.width()), height = static_cast<std::size_t>(atlas.height());
     ErrorSummary::Worst& worst = outcome_.report.error.worst;
     worst.error = place.error;
@@ -430,11 +245,8 @@ class Bake {
   const Surfaces& surfaces_;
   ProgressMeter& progress_;
   std::stop_token stop_, finish_;
-  std::optional<LightmapGather> lightmaps_;
-  std::optional<VertexGather> vertices_;
-  std::vector<std::uint32_t> twice_as_large_;  ///< [patches]
+  PassRunner passes_;
   bool has_ended_early_ = false;
-  double error_bound_ = 0;  ///< of the last pass's solutions, lx
   PassResults results_;
   BakeOutcome outcome_;
 };

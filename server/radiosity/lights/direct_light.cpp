@@ -49,8 +49,10 @@ struct SiteRun {
     first = replicate * num_sites / num_replicates;
     size = (replicate + 1) * num_sites / num_replicates - first;
   }
-  /// Spread over the run: several samples share a site, or some sites have none.
-  std::size_t of_sample(std::size_t k, std::size_t samples) const { return first + k * size / samples; }
+  /// Several samples share a site, or the last sites have none: the first of a net are one too.
+  std::size_t of_sample(std::size_t k, std::size_t samples) const {
+    return first + (samples >= size ? k * size / samples : k);
+  }
 };
 
 /// The same for all samples of all replicates.

@@ -96,6 +96,35 @@ TEST(Sun, IsBlockedByWhatStandsInItsWay) {
   EXPECT_NEAR(floor.irradiance(4, 1, {1.5, 0, 0.5}).x, 1000, 1000 * kSinglePrecision);
 }
 
+// Of 64 sites that are a net, 16 samples take 16 that are one too: a straight edge cuts off their share to 1/16 a side.
+TEST(Sun, IsSeenFromSitesSpreadOverTheReceiverByFewSamples) {
+  tests::RoomBuilder builder = floor_scene();
+  builder.scene().lights.push_back({"sun", DirectionalLight{{0, -1, 0}, {1000, 1000, 1000}}});
+  builder.add_quad("roof", {-5, 1, -5}, {5, 0, 0}, {0, 0, 10}, 0);  // over x < 0
+  const Scene scene = builder.scene();
+  const SurveyedScene surveyed = survey_scene(scene).value();
+  const Surfaces& surfaces = surveyed.surfaces;
+  const auto visibility = make_embree_visibility(surfaces.corners);
+  constexpr int kSites = 64, kSamples = 16;
+  const DirectLight direct(surfaces, *visibility, kSamples);
+  const SobolPoints points(kSites);
+  DirectLight::Scratch scratch;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    const auto seeds = SobolPoints::seeds_of(seed);
+    std::vector<Site> sites;
+    for (int s = 0; s < kSites; ++s) {
+      // A square of 0.1 m on the first triangle of the floor.
+      const double x = 0.1 * (points.coordinate(s, 0, seeds) - 0.5), z = 2 + 0.1 * points.coordinate(s, 1, seeds);
+      const SurfacePoint p{0, (z - x) / 10, (x + 5) / 10};
+      sites.push_back(front_site(surfaces, p, surfaces.normals[0]));
+    }
+    const std::vector<std::uint8_t> none(sites.size(), 0);
+    Vec3 estimate;
+    direct.estimate(sites, none, seed, scratch, std::span(&estimate, 1));
+    EXPECT_NEAR(estimate.x, 500, 1000.0 / kSamples + 1000 * kSinglePrecision) << seed;
+  }
+}
+
 // An element under the corner of a parallel rectangle a x b at distance c, X = a/c, Y = b/c:
 // F = 1/(2 pi) [X/sqrt(1+X2) atan(Y/sqrt(1+X2)) + Y/sqrt(1+Y2) atan(X/sqrt(1+Y2))].
 TEST(AreaLight, MatchesTheClosedFormOverAnElement) {

@@ -145,6 +145,9 @@ TEST(StreamedOperator, BakesTheMapsOfTheSparseOneWithinSamplingError) {
             small_bake(FormFactors::kHemisphere, streamed ? Transport::kStreamed : Transport::kSparse);
         options.seed = static_cast<std::uint64_t>(seed + 100 * streamed);
         options.solver = solver;
+        // Rows of fewer rays are no longer two estimates of one room: what shoots by columns gets sums above and
+        // below 1.
+        options.rays = 128;
         const double mean = mean_of(baked(scene, options));
         sums[streamed] += mean / kSeeds;
         squares[streamed] += mean * mean / kSeeds;
@@ -152,7 +155,7 @@ TEST(StreamedOperator, BakesTheMapsOfTheSparseOneWithinSamplingError) {
     }
     const double variance = (squares[0] - sums[0] * sums[0] + squares[1] - sums[1] * sums[1]) / (kSeeds - 1);
     EXPECT_LE(std::fabs(sums[0] - sums[1]), kStudent * std::sqrt(variance)) << solver_name(solver);
-    EXPECT_LE(std::sqrt(variance), 0.012 * sums[0]);  // or it would say little
+    EXPECT_LE(std::sqrt(variance), 0.01 * sums[0]);  // or it would say little
   }
 }
 

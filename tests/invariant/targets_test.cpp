@@ -162,17 +162,17 @@ TEST(Finish, EndsABakeWithItsFirstPass) {
 }
 
 TEST(Targets, HoldForLightByVertex) {
-  BakeOptions options{.output = radiosity::Output::kVertices, .max_error = 0.02};
+  BakeOptions options{.output = radiosity::Output::kVertices, .max_error = 0.03};
   const BakeOutcome outcome = baked(small_emitter_room(0.7), options);
   EXPECT_TRUE(outcome.report.error.is_reached);
-  EXPECT_LE(outcome.report.error.relative_rmse, 0.02);
+  EXPECT_LE(outcome.report.error.relative_rmse, 0.03);
   EXPECT_LT(outcome.report.error.interval_low, outcome.report.error.relative_rmse);
   EXPECT_GT(outcome.report.error.interval_high, 1.01 * outcome.report.error.relative_rmse);
 }
 
 TEST(Targets, RefinePatchesWhereTheirSizeLeads) {
   // Few, large patches; the bound leaves room for more.
-  BakeOptions options{.atlas_size = 96, .max_patches = 4096, .max_error = 0.005};
+  BakeOptions options{.atlas_size = 96, .max_patches = 4096, .max_error = 0.01};
   const Scene scene = small_emitter_room(0.7);
   const BakeOutcome outcome = baked(scene, options);
   const bool has_refined = std::any_of(outcome.report.passes.begin(), outcome.report.passes.end(),

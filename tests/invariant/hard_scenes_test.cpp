@@ -269,9 +269,10 @@ Scene room_with_box_on_floor(bool is_cut) {
 }
 
 TEST(HardCase30BoxOnTheFloorOfAClosedRoom, LightsTheFloorAsIfItWereCutOut) {
-  // Both maps are estimates: with these rays a texel's standard error is about 0.15 %.
+  // Both maps are estimates, and state their standard errors, about 0.2 %: three of their difference are noise, as the
+  // worst of two thousand is looked at.
   constexpr double kAsked = 0.01;
-  const BakeOptions options{.atlas_size = 96, .rays = 16384};
+  const BakeOptions options{.atlas_size = 96, .rays = 8192};
   const auto whole = tests::baked(room_with_box_on_floor(false), options);
   const auto cut = tests::baked(room_with_box_on_floor(true), options);
   const std::vector<float>&values = whole.layers.at(0).values, &expected = cut.layers.at(0).values;
@@ -281,7 +282,8 @@ TEST(HardCase30BoxOnTheFloorOfAClosedRoom, LightsTheFloorAsIfItWereCutOut) {
     for (int x = 0; x < options.atlas_size / 2; ++x) {
       const std::size_t at = 4 * (static_cast<std::size_t>(y) * options.atlas_size + x);
       if (expected[at + 3] == 0) continue;  // wholly under the box
-      worst = std::max(worst, std::fabs(values[at] / static_cast<double>(expected[at]) - 1));
+      const double noise = 3 * std::hypot(whole.layers.back().values[at], cut.layers.back().values[at]) / expected[at];
+      worst = std::max(worst, std::fabs(values[at] / static_cast<double>(expected[at]) - 1) - noise);
       ++lit;
       at_contact += expected[at + 3] < 0.999;
     }

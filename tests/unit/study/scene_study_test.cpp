@@ -106,7 +106,8 @@ TEST(BakeStudy, WritesTheLightmapsOfTheBakeItself) {
   const fs::path folder = fs::path(testing::TempDir()) / "bake_study";
   fs::create_directories(folder);
   ASSERT_TRUE(write_lightmaps(bake.outcome, folder).ok());
-  ASSERT_EQ(bake.outcome.layers.size(), 1U);
+  ASSERT_EQ(bake.outcome.layers.size(), 2U);
+  EXPECT_EQ(bake.outcome.layers[1].name, "error_0");
   EXPECT_EQ(image::read_exr(folder / "lightmap_0.exr").value().values, bake.outcome.layers[0].values);
 
   double of_stages = 0;

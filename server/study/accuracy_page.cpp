@@ -178,7 +178,10 @@ std::string accuracy_page(const AccuracyStudy& study, const std::string& picture
       "without reading the scene and writing files.\n",
       static_cast<unsigned long long>(study.num_texels), static_cast<unsigned long long>(study.num_compared),
       study.threads, study.instruction_set.c_str());
-  text += reference_words(study) + "\n\n![error over CPU time](" + picture + ")\n\n## What to use when\n\n" +
+  text += reference_words(study) + "\n\n![error over CPU time](" + picture +
+          ")\n\n## What to use when\n\n"
+          "`--max-error` chooses all of this by itself and says what it reached. Fixed settings are for who knows the "
+          "scene: `--rays` and `--max-patches` on the command line; spacing and light samples are the library's.\n\n" +
           target_table(study, front) + "\n" + progressive_words(study, front) + "\n## What each setting buys\n\n" +
           "Error and CPU time, one setting varied and the others in the middle (256 rays, every 4th texel, 64 light "
           "samples).\n\n";

@@ -23,6 +23,9 @@ constexpr int kMiddleRays = 256, kMiddleSpacing = 4, kMiddleLightSamples = 64;
 /// So that elimination and all form factors by formula take part.
 constexpr int kPatchesOfMethods = 1000;
 
+/// Every pair of patches has its price by formula: minutes above.
+constexpr std::uint64_t kMaxPatchesByFormula = 2000;
+
 double cpu_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -229,6 +232,10 @@ Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::Ba
   options.form_factors = radiosity::FormFactors::kAdaptive;
   options.solver = radiosity::Solver::kKrylov;
   options.max_error = options.time_budget_seconds = 0;
+  const auto by_formula = radiosity::plan_scene(scene, options);
+  if (!by_formula.ok() || by_formula->plan.num_patches > kMaxPatchesByFormula) {
+    options.form_factors = radiosity::FormFactors::kHemicube;
+  }
   AccuracyReference reference;
   image::Pixels maps[2];
   for (const std::uint64_t half : {std::uint64_t{0}, std::uint64_t{1}}) {
@@ -249,8 +256,9 @@ Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::Ba
   char text[300];
   std::snprintf(text, sizeof text,
                 "the mean of two bakes with other seeds, of %d rays and %d light samples at every texel, at most %d "
-                "patches, form factors `adaptive` (near pairs by formula) and solver `krylov`",
-                effort.rays, effort.light_samples, effort.max_patches);
+                "patches, form factors `%s` and solver `krylov`",
+                effort.rays, effort.light_samples, effort.max_patches,
+                radiosity::form_factors_name(options.form_factors));
   reference.origin = text;
   return reference;
 }

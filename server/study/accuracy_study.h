@@ -62,7 +62,8 @@ struct ReferenceEffort {
   int max_patches = 16384;
 };
 
-/// Bakes a reference: two seeds, all texels gather, form factors of near pairs by formula.
+/// Bakes a reference: two seeds, all texels gather, form factors of near pairs by formula (`adaptive`), or by hemicubes
+/// above 2000 patches and where light passes surfaces, which formulas do not know.
 ///
 ///   reference = (a + b) / 2        its error = rms(a - b) / 2 / mean
 ///

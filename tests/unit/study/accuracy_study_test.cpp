@@ -12,6 +12,7 @@
 #include "server/study/accuracy_front.h"
 #include "server/study/accuracy_report.h"
 #include "server/study/commands.h"
+#include "tests/scenes/effect_rooms.h"
 #include "tests/scenes/rooms.h"
 
 namespace radbake::study {
@@ -127,11 +128,14 @@ TEST(StackedLightmaps, LeaveARowBetweenSheetsAndOtherLayersOut) {
   EXPECT_THAT(stack.values, ElementsAre(1, 2, 3, 4, 0, 0, 0, 0, 5, 6, 7, 8));
 }
 
+/// Fine enough that patches are not what errors come from, and few enough for form factors by formula.
+constexpr int kPatches = 1200;
+
 /// Of a small room, without the minutes of the real sweep.
 AccuracySweep small_sweep(std::vector<int> rays) {
   AccuracySweep sweep;
   sweep.base.texels_per_meter = 2;
-  sweep.base.max_patches = 200;
+  sweep.base.max_patches = kPatches;
   for (const int n : rays) {
     radiosity::BakeOptions options = sweep.base;
     options.rays = n;
@@ -141,7 +145,7 @@ AccuracySweep small_sweep(std::vector<int> rays) {
   return sweep;
 }
 
-constexpr ReferenceEffort kSmallEffort{2048, 1024, 200};
+constexpr ReferenceEffort kSmallEffort{1024, 1024, kPatches};
 
 TEST(AccuracyStudy, MeasuresErrorsThatFallWithRaysAgainstAReferenceWhoseErrorIsSmaller) {
   const Scene scene = tests::small_emitter_room(0.5);
@@ -174,10 +178,20 @@ TEST(AccuracyStudy, MeasuresErrorsThatFallWithRaysAgainstAReferenceWhoseErrorIsS
   EXPECT_LE(progressive.points.back().stated, 0.1);
 }
 
+TEST(AccuracyStudy, TakesHemicubesForItsReferenceWhereLightPassesSurfaces) {
+  const Scene opaque = tests::small_emitter_room(0.5);
+  const AccuracySweep sweep = small_sweep({});
+  EXPECT_THAT(make_reference(opaque, sweep.base, {64, 64, kPatches}).value().origin, HasSubstr("`adaptive`"));
+  for (const tests::EffectRoom& room : tests::rooms_with_effects()) {
+    if (room.name != "tint") continue;
+    EXPECT_THAT(make_reference(room.scene, sweep.base, {64, 64, kPatches}).value().origin, HasSubstr("`hemicube`"));
+  }
+}
+
 TEST(AccuracyStudy, LeavesOutWhatABakeRefusesAndFailsWhereThatIsAll) {
   const Scene scene = tests::small_emitter_room(0.5);
   const AccuracySweep sweep = small_sweep({3, 16});
-  const AccuracyReference reference = make_reference(scene, sweep.base, {64, 64, 200}).value();
+  const AccuracyReference reference = make_reference(scene, sweep.base, {64, 64, kPatches}).value();
   const auto quiet = [](std::size_t, std::size_t, const std::string&) {};
   const AccuracyStudy study = study_accuracy(scene, sweep, reference, quiet).value();
   EXPECT_EQ(study.runs.size(), 1U);

@@ -118,7 +118,7 @@ Result<std::vector<PatchLight>> PassRunner::solve_replicates(const Pass& pass, s
 }
 
 /// What counts as no light: what the solver cannot tell from 0, and a thousandth of what patches send in the mean.
-/// A few rays that slip along a contact bring as much into what is closed.
+/// A ray in millions that slips along an edge brings as much into what is closed.
 double PassRunner::darkness_of(const std::vector<PatchLight>& light) const {
   constexpr double kShare = 1e-3;
   double flux = 0, area = 0;

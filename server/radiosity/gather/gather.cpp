@@ -41,7 +41,6 @@ struct LightmapGather::NodeLight {
   float coarser_square = 0;
   float nearest = 0;  ///< harmonic mean of the distances that its rays went, scene units
   bool sees_light = false;
-  bool is_buried = false;
 };
 
 struct LightmapGather::Scratch {
@@ -97,8 +96,6 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   facts.area = static_cast<float>(scratch.footprint.area());
   facts.is_emitter = std::any_of(scratch.footprint.pieces.begin(), scratch.footprint.pieces.end(),
                                  [&](const FootprintPiece& piece) { return surfaces_.is_emitter[piece.triangle]; });
-  facts.state = TexelState::kBuried;
-
   place_sites(scene, points, x, y, scratch);
   const Reception reception =
       receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive,
@@ -106,11 +103,8 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   scratch.counts.num_rays += reception.rays;
   scratch.counts.num_light_rays += reception.light_rays;
   ++scratch.counts.num_gathered;
-  if (reception.is_buried) {
-    if (node != nullptr) node->is_buried = true;
-    return false;
-  }
-  facts.state = TexelState::kValid;
+  facts.state = reception.is_buried ? TexelState::kBuried : TexelState::kValid;
+  if (reception.is_buried) return false;
 
   const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
   Replicates direct, gathered, coarser;

@@ -70,7 +70,8 @@ LightEstimate::LightEstimate(std::size_t num_receivers, std::size_t num_cells, b
       interpolation_square_(num_cells) {}
 
 void LightEstimate::add(std::size_t i, const PassLight& light, double direct_weight) {
-  const double gathered_share = pass_weight_ / (gathered_weight_ + pass_weight_);
+  const bool is_first = direct_weight_[i] == 0;
+  const double gathered_share = is_first ? 1 : pass_weight_ / (gathered_weight_ + pass_weight_);
   const double direct_share = direct_weight / (direct_weight_[i] + direct_weight);
   move_mean(gathered_, i, light.gathered, gathered_share);
   move_variance(gathered_variance_, i, light.gathered_variance, gathered_share);

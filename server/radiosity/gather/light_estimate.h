@@ -58,7 +58,8 @@ class LightEstimate {
   std::size_t size() const { return direct_weight_.size(); }
   std::size_t num_cells() const { return patch_square_.size(); }
 
-  /// Every receiver is added once a pass, or never where it has no light. `gathered_weight`: of this pass.
+  /// Every receiver is added once a pass, or not at all where it is buried: it keeps what other passes found.
+  /// `gathered_weight`: of this pass.
   void begin_pass(double gathered_weight) { pass_weight_ = gathered_weight; }
   void add(std::size_t receiver, const PassLight& light, double direct_weight);
   void end_pass() { gathered_weight_ += pass_weight_; }

@@ -23,30 +23,25 @@ std::size_t sites_each(const GatherScene& scene, const ReceiveScratch& scratch) 
 /// Whether most of a site's rays meet backs: it lies inside of something closed, or under a sheet.
 bool is_under_backs(const RowSample::SiteRays& own) { return 2 * own.backs > own.counted; }
 
-/// Whether light that was reflected reaches a site, or the sky.
-bool sees_light(const GatherScene& scene, const ReceiveScratch& scratch, std::size_t site) {
-  const RowSample::SiteRays& own = scratch.row.of_site[site];
-  if (own.escaped > 0) return true;
-  const std::span<const Vec3> radiosity = scene.sent[site / sites_each(scene, scratch)].radiosity;
-  for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
-    if (max_component(radiosity[scratch.row.arrivals[own.first_arrival + k]]) > scene.dark) return true;
-  }
-  return false;
-}
-
-/// Leaves sites out that are inside of something closed: most of their rays meet backs, and no light reaches any of
-/// them, be it reflected or from a lamp. They are judged together: a few rays each miss the light under a sheet by
-/// chance, and to leave those out would brighten what lies under it.
+/// Leaves sites out that are inside of something closed: most of their rays meet backs, and next to no light reaches
+/// them, be it reflected, from the sky or from a lamp. They are judged together: a few rays each miss the light under a
+/// sheet by chance, and to leave those out would brighten what lies under it. And they are judged by how much arrives:
+/// of millions of rays one slips along an edge, and lights all of the inside a little.
 void leave_out_sealed(const GatherScene& scene, std::uint64_t light_seed, ReceiveScratch& scratch, Reception& out) {
   std::vector<std::uint8_t> is_other(scratch.sites.size(), 1);
-  bool is_any = false;
+  double light = 0, num_rays = 0;
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
-    if (scratch.is_out[s] || !is_under_backs(scratch.row.of_site[s])) continue;
-    if (sees_light(scene, scratch, s)) return;
+    const RowSample::SiteRays& own = scratch.row.of_site[s];
+    if (scratch.is_out[s] || !is_under_backs(own)) continue;
+    if (own.escaped > 0) return;
     is_other[s] = 0;
-    is_any = true;
+    num_rays += own.counted;
+    const std::span<const Vec3> radiosity = scene.sent[s / sites_each(scene, scratch)].radiosity;
+    for (std::uint32_t k = 0; k < own.num_arrivals; ++k) {
+      light += max_component(radiosity[scratch.row.arrivals[own.first_arrival + k]]);
+    }
   }
-  if (!is_any) return;
+  if (num_rays == 0 || light > scene.dark * num_rays) return;
   Vec3 direct;
   out.light_rays += scene.direct.estimate(scratch.sites, is_other, light_seed, scratch.light, std::span(&direct, 1));
   if (!(direct == Vec3{})) return;

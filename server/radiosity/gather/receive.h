@@ -32,7 +32,7 @@ struct GatherScene {
   std::uint64_t seed = 0;
   /// Of channels 1 and 2, where they have rows of their own; `rows` is channel 0's then.
   std::span<const HemisphereEstimator> other_rows = {};
-  double dark = 0;  ///< radiosity up to this is none: what the solver cannot tell from 0, lx
+  double dark = 0;  ///< irradiance up to this is none: what the solver cannot tell from 0, lx
 };
 
 /// Light that arrives at one receiver, mean over the part that counts, lx.

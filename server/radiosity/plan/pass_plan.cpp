@@ -58,11 +58,11 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
     return std::nullopt;
   }
 
-  // What sampling may leave. Where the other parts take all, it is brought well below them.
+  // What sampling may leave. Where the other parts take all, it is brought to half of them: less would be hard to see.
   double allowed = 0;
   if (max_error > 0) {
     allowed = squared(kAim * max_error) - fixed;
-    const double floor = fixed / 16;
+    const double floor = fixed / 4;
     if (allowed < floor) {
       if (!refines && direct + gathered <= 2 * floor) {
         no_pass.limited_by = "discretisation";

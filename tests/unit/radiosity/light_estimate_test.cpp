@@ -52,5 +52,20 @@ TEST(LightEstimate, WeighsPassesAndAddsUpTheirVariances) {
   EXPECT_EQ(light.irradiance(1), Vec3{});
 }
 
+// Buried as the first pass saw it, not as the others did: what it did not measure is not a darkness of 0.
+TEST(LightEstimate, KeepsPassesApartThatLeftAReceiverOut) {
+  LightEstimate light(1, 1, false, false);
+  light.begin_pass(1);
+  light.end_pass();
+  light.begin_pass(1);
+  light.add(0, {{8, 8, 8}, {4, 4, 4}, {16, 16, 16}, {1, 1, 1}, {}, 0}, 4);
+  light.end_pass();
+  EXPECT_EQ(light.gathered(0), (Vec3{4, 4, 4}));
+  EXPECT_EQ(light.gathered_variance(0), (Vec3{1, 1, 1}));
+  light.begin_pass(2);
+  light.end_pass();
+  EXPECT_EQ(light.irradiance(0), (Vec3{12, 12, 12}));
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

@@ -112,13 +112,15 @@ std::string target_table(const AccuracyStudy& study, const AccuracyFront& front)
   for (const AccuracyRun& run : study.runs) has_progressive = has_progressive || !run.setting;
   if (!has_progressive) return text;
   text +=
-      "\n| asked by `--max-error` | passes | stated | true error | CPU time | a fixed setting has, for that time |\n"
-      "|---|---|---|---|---|---|\n";
+      "\n| asked | passes | stated | true error | CPU time | time | a fixed setting has, for that CPU time |\n"
+      "|---|---|---|---|---|---|---|\n";
   for (const AccuracyRun& run : study.runs) {
     if (run.setting) continue;
     const auto fixed = front.error_at(last(run).cpu_seconds);
-    text += "| " + percent(run.target) + " | " + std::to_string(run.points.size()) + " | " + percent(last(run).stated) +
-            " | " + percent(last(run).error) + " | " + seconds(last(run).cpu_seconds) + " | " +
+    const std::string asked = run.budget > 0 ? print("`--time-budget %gs`", run.budget)
+                                             : print("`--max-error %g%%`", 100 * run.target);
+    text += "| " + asked + " | " + std::to_string(run.points.size()) + " | " + percent(last(run).stated) + " | " +
+            percent(last(run).error) + " | " + seconds(last(run).cpu_seconds) + " | " + seconds(last(run).seconds) + " | " +
             (fixed ? percent(*fixed) : "nothing yet") + " |\n";
   }
   return text;
@@ -205,18 +207,19 @@ std::string accuracy_page(const AccuracyStudy& study, const std::string& picture
 
 std::string accuracy_csv(const AccuracyStudy& study) {
   std::string text =
-      "axis,value,rays,spacing,light_samples,max_patches,form_factors,solver,target,pass,cpu_seconds,seconds,"
+      "axis,value,rays,spacing,light_samples,max_patches,form_factors,solver,target,budget,pass,cpu_seconds,seconds,"
       "difference,error,stated_error\n";
   for (const AccuracyRun& run : study.runs) {
     for (std::size_t k = 0; k < run.points.size(); ++k) {
       const AccuracyPoint& p = run.points[k];
       if (run.setting) {
         const radiosity::BakeOptions& o = run.setting->options;
-        text += print("%s,%s,%d,%d,%d,%d,%s,%s,,", accuracy_axis_name(run.setting->axis), run.setting->value.c_str(),
+        text += print("%s,%s,%d,%d,%d,%d,%s,%s,,,", accuracy_axis_name(run.setting->axis), run.setting->value.c_str(),
                       o.rays, o.spacing, o.light_samples, o.max_patches, radiosity::form_factors_name(o.form_factors),
                       o.solver ? radiosity::solver_name(*o.solver) : "auto");
       } else {
-        text += print("progressive,,,,,,,,%g,", run.target);
+        text += "progressive,,,,,,,," + (run.target > 0 ? print("%g", run.target) : "") + "," +
+                (run.budget > 0 ? print("%g", run.budget) : "") + ",";
       }
       text += print("%zu,%.6g,%.6g,%.6g,%.6g,%.6g\n", k, p.cpu_seconds, p.seconds, p.difference, p.error, p.stated);
     }

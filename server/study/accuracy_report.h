@@ -7,8 +7,8 @@
 
 namespace radbake::study {
 
-/// axis,value,rays,spacing,light_samples,max_patches,form_factors,solver,target,pass,cpu_seconds,seconds,difference,
-/// error,stated_error
+/// axis,value,rays,spacing,light_samples,max_patches,form_factors,solver,target,budget,pass,cpu_seconds,seconds,
+/// difference,error,stated_error
 std::string accuracy_csv(const AccuracyStudy& study);
 
 /// Error over CPU seconds with the Pareto front, and true error over the error that bakes state.

@@ -32,9 +32,33 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-bool is_lightmap(const std::string& layer) {
-  const std::string start = "lightmap_";
+bool is_layer(const std::string& layer, const std::string& start) {
   return layer.rfind(start, 0) == 0 && layer.find_first_not_of("0123456789", start.size()) == std::string::npos;
+}
+bool is_lightmap(const std::string& layer) { return is_layer(layer, "lightmap_"); }
+
+/// Sheets of one kind, one below the other, with a row between them that nothing covers.
+image::Pixels stacked_layers(const std::vector<radiosity::Layer>& layers, const std::string& start) {
+  image::Pixels stack;
+  for (const radiosity::Layer& layer : layers) {
+    if (!is_layer(layer.name, start)) continue;
+    if (stack.height > 0) {
+      stack.values.insert(stack.values.end(), std::size_t(stack.width) * std::size_t(stack.channels), 0.0F);
+      ++stack.height;
+    }
+    stack.width = layer.width;
+    stack.height += layer.height;
+    stack.channels = layer.channels;
+    stack.values.insert(stack.values.end(), layer.values.begin(), layer.values.end());
+  }
+  return stack;
+}
+
+/// Takes the coverage from texels that have no error of their own: filled ones, and emitters.
+void leave_out_filled(const image::Pixels& errors, image::Pixels& map) {
+  for (std::size_t k = 3; k < map.values.size() && k < errors.values.size(); k += 4) {
+    if (errors.values[k] == 0) map.values[k] = 0;
+  }
 }
 
 /// Keeps the lightmaps as each pass leaves them.
@@ -161,7 +185,7 @@ const char* accuracy_axis_name(AccuracyAxis axis) {
 }
 
 AccuracySweep default_sweep(const radiosity::BakeOptions& base) {
-  AccuracySweep sweep{base, {}, {}};
+  AccuracySweep sweep{base, {}, {}, {}};
   sweep.base.rays = sweep.base.light_samples = sweep.base.spacing = 0;
   sweep.base.max_error = sweep.base.time_budget_seconds = 0;
   radiosity::BakeOptions middle = sweep.base;
@@ -203,23 +227,12 @@ AccuracySweep default_sweep(const radiosity::BakeOptions& base) {
     add(AccuracyAxis::kBalanced, std::to_string(rays), [&](auto& o) { o.rays = rays, o.light_samples = samples; });
   }
   sweep.targets = {0.10, 0.05, 0.02, 0.01};
+  sweep.budgets = {1, 5, 20};
   return sweep;
 }
 
 image::Pixels stacked_lightmaps(const std::vector<radiosity::Layer>& layers) {
-  image::Pixels stack;
-  for (const radiosity::Layer& layer : layers) {
-    if (!is_lightmap(layer.name)) continue;
-    if (stack.height > 0) {
-      stack.values.insert(stack.values.end(), std::size_t(stack.width) * std::size_t(stack.channels), 0.0F);
-      ++stack.height;
-    }
-    stack.width = layer.width;
-    stack.height += layer.height;
-    stack.channels = layer.channels;
-    stack.values.insert(stack.values.end(), layer.values.begin(), layer.values.end());
-  }
-  return stack;
+  return stacked_layers(layers, "lightmap_");
 }
 
 Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::BakeOptions& base,
@@ -243,11 +256,13 @@ Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::Ba
     options.seed = base.seed + 1000003 * (half + 1);
     RADBAKE_ASSIGN_OR_RETURN(const MeasuredBake bake, bake_once(scene, options));
     maps[half] = stacked_lightmaps(bake.outcome.layers);
+    leave_out_filled(stacked_layers(bake.outcome.layers, "error_"), maps[half]);
     reference.cpu_seconds += bake.cpu_seconds;
   }
   reference.map = maps[0];
   for (std::size_t k = 0; k < reference.map.values.size(); ++k) {
-    reference.map.values[k] = (maps[0].values[k] + maps[1].values[k]) / 2;
+    const bool is_left_out = k % 4 == 3 && (maps[0].values[k] == 0 || maps[1].values[k] == 0);
+    reference.map.values[k] = is_left_out ? 0 : (maps[0].values[k] + maps[1].values[k]) / 2;
   }
   const auto mask = image::comparable_texels(reference.map, true);
   // rms(a - b) / 2 = rms(a - (a + b) / 2).
@@ -269,13 +284,14 @@ Result<AccuracyStudy> study_accuracy(const Scene& scene, const AccuracySweep& sw
   study.reference = std::move(reference);
   const Ruler ruler(study.reference);
   study.num_compared = ruler.num_texels();
-  const std::size_t total = sweep.settings.size() + sweep.targets.size();
+  const std::size_t total = sweep.settings.size() + sweep.targets.size() + sweep.budgets.size();
   std::size_t done = 0;
 
   const auto run_one = [&](const radiosity::BakeOptions& options, const std::string& what,
                            AccuracyRun label) -> Result<void> {
     on_bake(done++, total, what);
-    const auto bake = bake_cheapest(scene, options);
+    // What fits into a budget is not the same again.
+    const auto bake = label.budget > 0 ? bake_once(scene, options) : bake_cheapest(scene, options);
     if (!bake.ok()) {
       study.left_out.push_back(what + ": " + bake.error().message);
       return {};
@@ -289,14 +305,21 @@ Result<AccuracyStudy> study_accuracy(const Scene& scene, const AccuracySweep& sw
     return {};
   };
   for (const FixedSetting& fixed : sweep.settings) {
-    RADBAKE_RETURN_IF_ERROR(run_one(fixed.options, setting_words(fixed.options), {fixed, 0, {}}));
+    RADBAKE_RETURN_IF_ERROR(run_one(fixed.options, setting_words(fixed.options), {fixed, 0, 0, {}}));
   }
   for (const double target : sweep.targets) {
     radiosity::BakeOptions options = sweep.base;
     options.max_error = target;
     char what[60];
     std::snprintf(what, sizeof what, "progressive, to %g %%", 100 * target);
-    RADBAKE_RETURN_IF_ERROR(run_one(options, what, {std::nullopt, target, {}}));
+    RADBAKE_RETURN_IF_ERROR(run_one(options, what, {std::nullopt, target, 0, {}}));
+  }
+  for (const double budget : sweep.budgets) {
+    radiosity::BakeOptions options = sweep.base;
+    options.time_budget_seconds = budget;
+    char what[60];
+    std::snprintf(what, sizeof what, "progressive, for %g s", budget);
+    RADBAKE_RETURN_IF_ERROR(run_one(options, what, {std::nullopt, 0, budget, {}}));
   }
   if (study.runs.empty()) return invalid_argument("no setting could be baked; the first: " + study.left_out.front());
   return study;

@@ -41,9 +41,10 @@ struct AccuracySweep {
   radiosity::BakeOptions base;  ///< of progressive bakes
   std::vector<FixedSetting> settings;
   std::vector<double> targets;  ///< of progressive bakes, as fractions
+  std::vector<double> budgets;  ///< of others, wall seconds
 };
 
-/// Some forty settings about the middle of each range, and progressive bakes to 10, 5, 2 and 1 %.
+/// Some forty settings about the middle of each range, and progressive bakes: to 10, 5, 2 and 1 %, for 1, 5 and 20 s.
 AccuracySweep default_sweep(const radiosity::BakeOptions& base);
 
 /// What the others are measured against: lightmaps of all sheets, one below the other.
@@ -81,7 +82,8 @@ struct AccuracyPoint {
 
 struct AccuracyRun {
   std::optional<FixedSetting> setting;  ///< absent: progressive
-  double target = 0;                    ///< of a progressive bake
+  double target = 0;                    ///< of a progressive bake, relative RMSE; 0: none
+  double budget = 0;                    ///< of a progressive bake, wall seconds; 0: none
   std::vector<AccuracyPoint> points;    ///< one, or one a pass
 };
 

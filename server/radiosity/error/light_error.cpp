@@ -147,7 +147,7 @@ std::vector<float> standard_errors(const LightmapGather& gather) {
                             squared(kRounding * irradiance[c]);
       out[4 * i + static_cast<std::size_t>(c)] = static_cast<float>(std::sqrt(square));
     }
-    out[4 * i + 3] = facts[i].coverage;
+    out[4 * i + 3] = does_count(facts[i]) ? facts[i].coverage : 0.0f;
   }
   return out;
 }

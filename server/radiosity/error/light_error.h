@@ -41,7 +41,8 @@ LightError estimate_error(const LightEstimate& estimate, const std::function<boo
 LightError estimate_error(const LightmapGather& gather, double algebraic_bound);
 
 /// Standard error of each texel, discretisation in quadrature, lx: the variances of neighbouring texels are pooled, as
-/// four replicates by themselves tell little. Shapes: rgba [texels * 4], coverage last; 0 where a texel is not valid.
+/// four replicates by themselves tell little. Shapes: rgba [texels * 4], coverage last; it is 0 where a texel does not
+/// count: not valid, or an emitter.
 std::vector<float> standard_errors(const LightmapGather& gather);
 
 /// Where the hundredth of the texels that count with the largest standard errors is.

@@ -12,10 +12,11 @@ constexpr double kMostRays = 65536;
 constexpr double kReplicates = 4;
 
 constexpr double kAim = 0.8, kDone = 0.9;
-/// A ray that finds the nearest surface and the patch there takes this many shadow rays' time.
-constexpr double kRayCost = 2;
+/// A ray that finds the nearest surface and the patch there, its share of rows and solver with it, takes this many
+/// shadow rays' time.
+constexpr double kRayCost = 4;
 /// Passes add at most this many times what was spent, so that the map improves as one looks on.
-constexpr double kGrowthToTarget = 3, kGrowthInBudget = 1;
+constexpr double kGrowth = 3;
 constexpr int kMostPasses = 64;
 /// Of the time left, what a pass may be predicted to take.
 constexpr double kSafeShare = 0.9;
@@ -101,21 +102,21 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
 
   // This pass's share of it.
   const double spent = results.direct_effort * direct_cost + results.gathered_effort * gathered_cost;
-  const double growth = has_budget ? kGrowthInBudget : kGrowthToTarget;
-  double share = std::min(1.0, growth * spent / std::max(rest, 1e-300));
+  double share = std::min(1.0, kGrowth * spent / std::max(rest, 1e-300));
   double seconds_share = 1;
   if (has_budget) {
     const double last_cost = results.last_direct_scale * direct_cost + results.last_gathered_scale * gathered_cost;
-    const double seconds = results.last_seconds * share * rest / std::max(last_cost, 1e-300);
-    const double most = kSafeShare * results.seconds_left;
+    const double variable = (results.last_seconds - results.fixed_seconds) / std::max(last_cost, 1e-300);
+    const double seconds = variable * share * rest;
+    const double most = std::max(0.0, kSafeShare * results.seconds_left - results.fixed_seconds);
     if (seconds > most) share *= most / seconds;
     // A last pass takes the rest where another of its size would not fit.
     if (share * rest < kLeastGrowth * spent) {
       no_pass.limited_by = "time";
       return std::nullopt;
     }
-    seconds_share = std::min(
-        1.0, share * rest / std::max(last_cost, 1e-300) * results.last_seconds / std::max(results.seconds_left, 1e-9));
+    seconds_share =
+        std::min(1.0, (results.fixed_seconds + variable * share * rest) / std::max(results.seconds_left, 1e-9));
   }
   NextPass next;
   next.scale = {std::max(share * gathered_rest, 0.25), std::max(share * direct_rest, 0.25), refines};

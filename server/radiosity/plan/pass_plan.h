@@ -37,6 +37,7 @@ struct PassResults {
   int num_passes = 0;
   double last_direct_scale = 0, last_gathered_scale = 0;
   double last_seconds = 0;   ///< wall, of the last pass
+  double fixed_seconds = 0;  ///< of it, what a pass of any size takes
   double seconds_left = -1;  ///< of a time budget; negative: there is none
   bool can_refine_patches = false;
 };
@@ -59,8 +60,8 @@ struct NoPass {
 /// The next pass towards a target, as cheap as the errors so far say: sampling errors fall with the square root of the
 /// effort, and the direct and the gathered part get what buys the most (the least cost c_d N_d + c_g N_g at which
 /// S_d / N_d + S_g / N_g is what the other errors leave of the target). It aims at 0.8 x the target and is done at 0.9.
-/// Where the patches' size leads the error and may be refined, the pass does. Within a budget, passes double until the
-/// last one fills what is left. Time decides only how large a pass is and whether there is one. `no_pass` says why
+/// Where the patches' size leads the error and may be refined, the pass does. Each pass takes at most three times
+/// what all before it took; within a budget, the last one fills what is left. Time decides only how large a pass is and whether there is one. `no_pass` says why
 /// there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
 std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass);
 

@@ -20,6 +20,7 @@ PassResults after_first_pass() {
   results.num_passes = 1;
   results.last_direct_scale = results.last_gathered_scale = 1;
   results.last_seconds = 0.2;
+  results.fixed_seconds = 0.05;
   return results;
 }
 
@@ -109,18 +110,18 @@ TEST(PassPlan, RefinesPatchesWhereTheirSizeLeads) {
 
 TEST(PassPlan, FillsABudgetAndNoMore) {
   PassResults results = after_first_pass();
-  constexpr double kBudget = 5;
+  constexpr double kBudget = 5, kRayCost = 4;
   double spent = results.last_seconds;
   NoPass no_pass;
   for (;;) {
     results.seconds_left = kBudget - spent;
-    const double cost = 2 * results.gathered_rays / results.gathered_effort * results.last_gathered_scale +
+    const double cost = kRayCost * results.gathered_rays / results.gathered_effort * results.last_gathered_scale +
                         results.direct_rays / results.direct_effort * results.last_direct_scale;
     const auto next = plan_next_pass(results, 0, no_pass);
     if (!next) break;
-    const double own = 2 * results.gathered_rays / results.gathered_effort * next->scale.gathered +
+    const double own = kRayCost * results.gathered_rays / results.gathered_effort * next->scale.gathered +
                        results.direct_rays / results.direct_effort * next->scale.direct;
-    results.last_seconds *= own / cost;
+    results.last_seconds = results.fixed_seconds + (results.last_seconds - results.fixed_seconds) * own / cost;
     spent += results.last_seconds;
     advance(*next, results);
     ASSERT_LT(results.num_passes, 40);

@@ -29,7 +29,7 @@ AccuracyRun fixed_run(AccuracyAxis axis, const std::string& value, double cpu_se
   options.spacing = 4;
   options.light_samples = 16;
   options.max_patches = 1000;
-  return {FixedSetting{axis, value, options}, 0, {{cpu_seconds, cpu_seconds / 2, error, error, error}}};
+  return {FixedSetting{axis, value, options}, 0, 0, {{cpu_seconds, cpu_seconds / 2, error, error, error}}};
 }
 
 /// Three settings of which one is beaten by another, and a progressive bake of two passes.
@@ -43,7 +43,7 @@ AccuracyStudy study_by_hand() {
   study.runs = {fixed_run(AccuracyAxis::kRays, "64", 1, 0.08),
                 fixed_run(AccuracyAxis::kRays, "16", 2, 0.16),
                 fixed_run(AccuracyAxis::kRays, "256", 4, 0.02),
-                {std::nullopt, 0.05, {{1, 1, 0.1, 0.1, 0.09}, {2, 1, 0.05, 0.05, 0.045}}}};
+                {std::nullopt, 0.05, 0, {{1, 1, 0.1, 0.1, 0.09}, {2, 1, 0.05, 0.05, 0.045}}}};
   study.left_out = {"rays 3: refused"};
   return study;
 }
@@ -151,6 +151,7 @@ TEST(AccuracyStudy, MeasuresErrorsThatFallWithRaysAgainstAReferenceWhoseErrorIsS
   const Scene scene = tests::small_emitter_room(0.5);
   AccuracySweep sweep = small_sweep({16, 256});
   sweep.targets = {0.1};
+  sweep.budgets = {0.2};
   AccuracyReference reference = make_reference(scene, sweep.base, kSmallEffort).value();
   EXPECT_GT(reference.error, 0);
   std::vector<std::string> told;
@@ -158,8 +159,8 @@ TEST(AccuracyStudy, MeasuresErrorsThatFallWithRaysAgainstAReferenceWhoseErrorIsS
       study_accuracy(scene, sweep, reference, [&](std::size_t done, std::size_t total, const std::string&) {
         told.push_back(std::to_string(done) + "/" + std::to_string(total));
       }).value();
-  EXPECT_THAT(told, ElementsAre("0/3", "1/3", "2/3"));
-  ASSERT_EQ(study.runs.size(), 3U);
+  EXPECT_THAT(told, ElementsAre("0/4", "1/4", "2/4", "3/4"));
+  ASSERT_EQ(study.runs.size(), 4U);
   const double coarse = study.runs[0].points.back().error, fine = study.runs[1].points.back().error;
   // 16 times the rays: a fourth of the error if they were independent, and half of it at the very least.
   EXPECT_LT(fine, coarse / 2);
@@ -176,6 +177,9 @@ TEST(AccuracyStudy, MeasuresErrorsThatFallWithRaysAgainstAReferenceWhoseErrorIsS
   EXPECT_TRUE(std::is_sorted(progressive.points.begin(), progressive.points.end(),
                              [](const auto& a, const auto& b) { return a.cpu_seconds < b.cpu_seconds; }));
   EXPECT_LE(progressive.points.back().stated, 0.1);
+  constexpr double kBusyMachine = 20;  // only that there is an end
+  EXPECT_EQ(study.runs[3].budget, 0.2);
+  EXPECT_LE(study.runs[3].points.back().seconds, kBusyMachine);
 }
 
 TEST(AccuracyStudy, TakesHemicubesForItsReferenceWhereLightPassesSurfaces) {
@@ -223,6 +227,7 @@ TEST(DefaultSweep, VariesOneThingAtATimeAndKeepsWhatIsNotSwept) {
   EXPECT_EQ(sweep.base.rays, 0);
   EXPECT_EQ(sweep.base.max_error, 0);
   EXPECT_THAT(sweep.targets, ElementsAre(0.1, 0.05, 0.02, 0.01));
+  EXPECT_THAT(sweep.budgets, ElementsAre(1, 5, 20));
   for (const FixedSetting& setting : sweep.settings) {
     EXPECT_EQ(setting.options.atlas_size, 256);
     EXPECT_EQ(setting.options.max_error, 0);

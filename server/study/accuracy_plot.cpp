@@ -48,7 +48,7 @@ Panel error_panel(const AccuracyStudy& study) {
   // The progressive bake with the most passes shows the course of all.
   Curve course, ends;
   course.title = "progressive, by pass";
-  ends.title = "progressive, to targets and budgets";
+  ends.title = "progressive, at its end";
   ends.has_line = false;
   const AccuracyRun* longest = nullptr;
   for (const AccuracyRun& run : study.runs) {

@@ -58,6 +58,7 @@ class Bake {
     constexpr double kFirstShare = 0.3;
     const std::vector<PassScale>& replay = options_.replay;
     const PassScale first = replay.empty() ? first_scale() : replay.front();
+    const std::size_t num_first_patches = prepared_.patches.size();
     RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(first), first, kFirstShare));
     for (;;) {
       results_.seconds_left =
@@ -80,7 +81,9 @@ class Bake {
         outcome_.report.error.predicted = next.predicted_error;
       }
       if (!finish_.stop_requested()) {
-        RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(next.scale), next.scale, next.share_of_rest));
+        if (next.scale.refines_patches) refine_patches();
+        const double growth = static_cast<double>(prepared_.patches.size()) / static_cast<double>(num_first_patches);
+        RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(next.scale, growth), next.scale, next.share_of_rest));
       }
       if (finish_.stop_requested() || has_ended_early_) {
         outcome_.report.error.limited_by = finish_.stop_requested() ? "stopped" : "time";
@@ -93,6 +96,12 @@ class Bake {
   bool is_over() const {
     return finish_.stop_requested() || (options_.time_budget_seconds > 0 &&
                                         progress_.seconds() > options_.time_budget_seconds - seconds_to_complete());
+  }
+
+  void refine_patches() {
+    passes_.refine_patches(max_refined_patches());
+    outcome_.report.num_patches = prepared_.patches.size();
+    results_.gathered_effort = results_.gathered_rays = 0;
   }
 
   /// Smaller than 1 where the first pass might take most of the time budget.
@@ -131,11 +140,6 @@ class Bake {
 
   /// The light of the patches, and the light that arrives from them.
   Result<void> run_pass(const PassSettings& settings, const PassScale& scale, double share_of_rest) {
-    if (scale.refines_patches) {
-      passes_.refine_patches(max_refined_patches());
-      outcome_.report.num_patches = prepared_.patches.size();
-      results_.gathered_effort = results_.gathered_rays = 0;
-    }
     if (stop_.stop_requested()) return cancelled();
     const int index = results_.num_passes;
     const double began = progress_.seconds();

@@ -12,7 +12,7 @@ namespace radbake::radiosity {
 namespace {
 
 /// Numbers that keep the seeds of one purpose apart from those of another.
-enum Purpose : std::uint64_t { kSitesOfTexel = 11, kRaysOfTexel = 12, kLightOfTexel = 13 };
+enum Purpose : std::uint64_t { kSitesOfTexel = 11, kRaysOfTexel = 12, kLightOfTexel = 13, kMoreLightOfTexel = 14 };
 
 /// Side of a tile, texels; twice that in a large atlas.
 constexpr int kTileEdge = 32;
@@ -27,8 +27,17 @@ void add_squares(std::span<const Vec3> replicates, Vec3 mean, std::array<double,
   }
 }
 
-/// Sites of a texel that gets direct light only.
-constexpr int kMostPlainSites = 16;
+/// Shadow rays that one place of a texel sends where there are many: more would tell that place's light better, and not
+/// the texel's, where a pattern of light and shadow is finer than a texel.
+constexpr int kSamplesPerSite = 4;
+/// Sites of a texel whose shadow rays are few.
+constexpr int kFewSites = 16;
+
+/// A multiple of the replicates.
+int num_light_sites(int samples, int replicates) {
+  const int most = std::max(kFewSites, samples / kSamplesPerSite);
+  return std::clamp(samples, replicates, most) / replicates * replicates;
+}
 
 using Replicates = std::array<Vec3, kMaxReplicates>;
 
@@ -86,6 +95,18 @@ void LightmapGather::place_sites(const GatherScene& scene, const SobolPoints& po
   }
 }
 
+void LightmapGather::place_light_sites(int x, int y, int num_sites, std::uint64_t seed, Scratch& scratch) const {
+  const bool has_home = roles_.spacing() > 1 && roles_.home(x, y) != TexelRoles::kNoTriangle;
+  scratch.receive.sites.clear();
+  for (int s = 0; s < num_sites; ++s) {
+    const std::uint64_t bits = mixed_bits(seed + static_cast<std::uint64_t>(s));
+    const double u = static_cast<double>(bits >> 32) * 0x1p-32, v = static_cast<double>(bits & 0xffffffffu) * 0x1p-32;
+    const SurfacePoint p = has_home ? roles_.point_at_home(x, y, u, v) : scratch.footprint.sample(u, v);
+    scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+  }
+  scratch.none_is_out.assign(scratch.receive.sites.size(), 0);
+}
+
 bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& scene, const SobolPoints& points, int x,
                                   int y, Scratch& scratch, NodeLight* node) {
   atlas_.footprint(x, y, scratch.footprint);
@@ -97,9 +118,11 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   facts.is_emitter = std::any_of(scratch.footprint.pieces.begin(), scratch.footprint.pieces.end(),
                                  [&](const FootprintPiece& piece) { return surfaces_.is_emitter[piece.triangle]; });
   place_sites(scene, points, x, y, scratch);
-  const Reception reception =
-      receive(scene, seed_of(scene.seed, kRaysOfTexel, id), seed_of(scene.seed, kLightOfTexel, id), scratch.receive,
-              light_samples_of(pass, id));
+  // The sites that rays leave from send shadow rays too, as many as is of use there.
+  const int samples = light_samples_of(pass, id);
+  const int of_sites = std::min(samples, kSamplesPerSite * static_cast<int>(scratch.receive.sites.size()));
+  const Reception reception = receive(scene, seed_of(scene.seed, kRaysOfTexel, id),
+                                      seed_of(scene.seed, kLightOfTexel, id), scratch.receive, of_sites);
   scratch.counts.num_rays += reception.rays;
   scratch.counts.num_light_rays += reception.light_rays;
   ++scratch.counts.num_gathered;
@@ -113,12 +136,24 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
     gathered[r] = reception.replicates[r].gathered;
     coarser[r] = reception.replicates[r].coarser;
   }
+  // Where all of the texel counts, others of its places send the rest.
+  const int rest = reception.visible_share == 1 ? samples - of_sites : 0;
+  if (rest > 0) {
+    Replicates others;
+    place_light_sites(x, y, num_light_sites(rest, scene.rows.replicates()), seed_of(scene.seed, kSitesOfTexel, id),
+                      scratch);
+    scratch.counts.num_light_rays +=
+        scene.direct.estimate(scratch.receive.sites, scratch.none_is_out, seed_of(scene.seed, kMoreLightOfTexel, id),
+                              scratch.light, std::span(others).first(num_replicates), rest);
+    const double share = static_cast<double>(rest) / samples;
+    for (std::size_t r = 0; r < num_replicates; ++r) direct[r] += (others[r] - direct[r]) * share;
+  }
   const MeanAndVariance sent = mean_and_variance(std::span(direct).first(num_replicates));
   const MeanAndVariance arrived = mean_and_variance(std::span(gathered).first(num_replicates));
   add_squares(std::span(gathered).first(num_replicates), arrived.mean, scratch.counts.squares);
   const Vec3 reflected = reception.mean(scene.rows.replicates()).reflected;
   estimate_.add(id, {sent.mean, arrived.mean, sent.variance, arrived.variance, reflected, reception.openness},
-                light_samples_of(pass, id));
+                of_sites + rest);
   const double coarser_square = mean_square_without_noise(std::span(coarser).first(num_replicates));
   if (node == nullptr) {
     scratch.cell.square += coarser_square;
@@ -233,18 +268,10 @@ void LightmapGather::gather_between(const GatherPass& pass, const std::vector<No
   const bool has_home = roles_.home(x, y) != TexelRoles::kNoTriangle;
   const int samples = light_samples_of(pass, id);
   const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
-  const int num_sites = std::clamp(samples, static_cast<int>(num_replicates), kMostPlainSites);
+  const int num_sites = num_light_sites(samples, static_cast<int>(num_replicates));
 
-  // Spread sites over the texel: one jittered grid, since nothing parts them.
   if (!has_home) atlas_.footprint(x, y, scratch.footprint);
-  const std::uint64_t seed = seed_of(scene.seed, kSitesOfTexel, id);
-  scratch.receive.sites.clear();
-  for (int s = 0; s < num_sites; ++s) {
-    const std::uint64_t bits = mixed_bits(seed + static_cast<std::uint64_t>(s));
-    const double u = static_cast<double>(bits >> 32) * 0x1p-32, v = static_cast<double>(bits & 0xffffffffu) * 0x1p-32;
-    const SurfacePoint p = has_home ? roles_.point_at_home(x, y, u, v) : scratch.footprint.sample(u, v);
-    scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
-  }
+  place_light_sites(x, y, num_sites, seed_of(scene.seed, kSitesOfTexel, id), scratch);
   if (facts.state == TexelState::kOutside) {
     const std::uint32_t t = scratch.receive.sites[0].point.triangle;
     facts.coverage = 1;
@@ -255,7 +282,6 @@ void LightmapGather::gather_between(const GatherPass& pass, const std::vector<No
   }
 
   Replicates direct;
-  scratch.none_is_out.assign(scratch.receive.sites.size(), 0);
   scratch.counts.num_light_rays +=
       scene.direct.estimate(scratch.receive.sites, scratch.none_is_out, seed_of(scene.seed, kLightOfTexel, id),
                             scratch.light, std::span(direct).first(num_replicates), samples);

@@ -30,12 +30,13 @@ int whole(double wanted, double least, double multiple) {
 
 }  // namespace
 
-PassSettings pass_of(const PassScale& scale) {
+PassSettings pass_of(const PassScale& scale, double patch_growth) {
   // Each replicate of a row has enough rays to tell what is buried.
   constexpr double kLeastRays = 8 * kReplicates;
   PassSettings pass;
-  pass.rays_per_row = whole(kRaysPerRow * scale.gathered, kLeastRays, kReplicates);
-  pass.patch_light_samples = whole(kPatchLightSamples * scale.gathered, 4 * kReplicates, 4 * kReplicates);
+  pass.rays_per_row = whole(kRaysPerRow * scale.gathered / patch_growth, kLeastRays, kReplicates);
+  pass.patch_light_samples =
+      whole(kPatchLightSamples * scale.gathered / patch_growth, 4 * kReplicates, 4 * kReplicates);
   pass.rays_per_texel = whole(kRaysPerTexel * scale.gathered, kLeastRays, kReplicates);
   pass.rays_per_node = whole(kRaysPerNode * scale.gathered, kLeastRays, kReplicates);
   pass.light_samples = whole(kLightSamples * scale.direct, kReplicates, kReplicates);
@@ -78,9 +79,10 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
   // Efforts with the least cost.
   const double direct_cost = results.direct_rays / results.direct_effort;
   const double gathered_cost = kRayCost * results.gathered_rays / results.gathered_effort;
-  // Where texels share samples out by their deviations s, mean(s)^2 / n is left of n samples each (Neyman 1934).
+  // Where texels share samples out by their deviations s, mean(s)^2 / n is left of n samples each (Neyman 1934). That
+  // is known of passes that have done so: the first has not.
   double direct_part = direct * results.direct_effort;
-  if (results.direct_deviation > 0) {
+  if (results.direct_deviation > 0 && results.num_passes == 1) {
     direct_part = std::min(direct_part, squared(results.direct_deviation) / kLightSamples);
   }
   const double gathered_part = gathered * results.gathered_effort;
@@ -119,7 +121,10 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
         std::min(1.0, (results.fixed_seconds + variable * share * rest) / std::max(results.seconds_left, 1e-9));
   }
   NextPass next;
-  next.scale = {std::max(share * gathered_rest, 0.25), std::max(share * direct_rest, 0.25), refines};
+  // Where the errors say that there is hardly anything left to do and yet it is not done, they have been too low.
+  const double least = has_budget ? 0 : kLeastGrowth;
+  next.scale = {std::max({share * gathered_rest, least * gathered_kept, 0.25}),
+                std::max({share * direct_rest, least * results.direct_effort, 0.25}), refines};
   const double direct_after = direct_part / (results.direct_effort + next.scale.direct);
   const double gathered_after = gathered_part / (gathered_kept + next.scale.gathered);
   next.predicted_error = std::sqrt(direct_after + gathered_after + fixed);

@@ -42,8 +42,10 @@ struct PassResults {
   bool can_refine_patches = false;
 };
 
-/// A pass of a scale: 1 is the first pass, the coarsest that tells its own error.
-PassSettings pass_of(const PassScale& scale);
+/// A pass of a scale: 1 is the first pass, the coarsest that tells its own error. `patch_growth`: patches now over those
+/// of the first pass. What a texel gathers is a mean over all patches that it sees, so that their rows share the rays
+/// that fewer had.
+PassSettings pass_of(const PassScale& scale, double patch_growth = 1);
 
 struct NextPass {
   PassScale scale;

@@ -139,6 +139,30 @@ TEST(PassPlan, EndsAtOnceWhereNoTimeIsLeft) {
   EXPECT_EQ(no_pass.limited_by, "time");
 }
 
+// What errors say was too low before: passes that add next to nothing would follow each other for ever.
+TEST(PassPlan, GoesOnInPassesThatMatterWhereItIsNotDone) {
+  PassResults results = after_first_pass();
+  results.num_passes = 6;
+  results.direct_effort = 400;
+  results.gathered_effort = 20;
+  results.direct_sampling = 0.06;
+  results.gathered_sampling = 0.001;
+  results.error = 0.06;
+  results.direct_deviation = 0.01;
+  NoPass no_pass;
+  const auto next = plan_next_pass(results, 0.05, no_pass);
+  ASSERT_TRUE(next);
+  EXPECT_GE(next->scale.direct, 40);
+  EXPECT_GE(next->scale.gathered, 2);
+}
+
+TEST(PassPlan, SharesRaysOutAmongPatchesThatAreMore) {
+  const PassScale scale{16, 1, false};
+  EXPECT_EQ(pass_of(scale, 4).rays_per_row, pass_of(scale).rays_per_row / 4);
+  EXPECT_EQ(pass_of(scale, 4).rays_per_texel, pass_of(scale).rays_per_texel);
+  EXPECT_EQ(pass_of(scale, 1000).rays_per_row, pass_of({1, 1, false}).rays_per_row);
+}
+
 TEST(PassPlan, GivesEachReplicateWholeShares) {
   for (const double scale : {0.25, 1.0, 1.3, 7.7, 300.0, 5000.0}) {
     const PassSettings pass = pass_of({scale, scale});

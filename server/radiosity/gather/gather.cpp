@@ -55,6 +55,7 @@ struct LightmapGather::NodeLight {
 struct LightmapGather::Scratch {
   Footprint footprint;
   ReceiveScratch receive;
+  std::vector<Site> known_sites;
   DirectLight::Scratch light;
   std::vector<std::uint8_t> none_is_out;
   struct Cell {
@@ -140,8 +141,10 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   const int rest = reception.visible_share == 1 ? samples - of_sites : 0;
   if (rest > 0) {
     Replicates others;
+    scratch.known_sites = scratch.receive.sites;
     place_light_sites(x, y, num_light_sites(rest, scene.rows.replicates()), seed_of(scene.seed, kSitesOfTexel, id),
                       scratch);
+    replace_unseen_sites(scene, scratch.known_sites, scratch.receive);
     scratch.counts.num_light_rays +=
         scene.direct.estimate(scratch.receive.sites, scratch.none_is_out, seed_of(scene.seed, kMoreLightOfTexel, id),
                               scratch.light, std::span(others).first(num_replicates), rest);

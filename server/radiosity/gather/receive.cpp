@@ -57,6 +57,16 @@ bool are_coplanar(const Site& a, const Site& b) {
          dot(a.facing, b.facing) > 0;
 }
 
+/// From one site to another, just above the surface.
+Ray segment_between(const Surfaces& surfaces, const Site& a, const Site& b) {
+  Ray segment;
+  segment.origin = lifted_origin(surfaces, a.position, a.facing, a.point.triangle);
+  const auto end = lifted_origin(surfaces, b.position, b.facing, b.point.triangle);
+  for (int axis = 0; axis < 3; ++axis) segment.direction[axis] = end[axis] - segment.origin[axis];
+  segment.max_distance = 1;
+  return segment;
+}
+
 /// Parts the sites by what stands between them, seen just above the surface. A site that cannot be seen from the first
 /// of a part is tried from a few others of it.
 class Parting {
@@ -104,12 +114,7 @@ class Parting {
         scratch_.part[s] = part;
         continue;
       }
-      Ray segment;
-      segment.origin = lifted_origin(scene_.surfaces, a.position, a.facing, a.point.triangle);
-      const auto end = lifted_origin(scene_.surfaces, b.position, b.facing, b.point.triangle);
-      for (int axis = 0; axis < 3; ++axis) segment.direction[axis] = end[axis] - segment.origin[axis];
-      segment.max_distance = 1;
-      scratch_.segments.push_back(segment);
+      scratch_.segments.push_back(segment_between(scene_.surfaces, a, b));
       targets_.push_back(s);
     }
     scratch_.is_blocked.resize(targets_.size());
@@ -280,6 +285,19 @@ ReceivedLight Reception::mean(int num_replicates) const {
     sum.coarser += own.coarser / num_replicates;
   }
   return sum;
+}
+
+void replace_unseen_sites(const GatherScene& scene, std::span<const Site> known, ReceiveScratch& scratch) {
+  scratch.segments.clear();
+  const auto known_of = [&](std::size_t s) -> const Site& { return known[s % known.size()]; };
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    scratch.segments.push_back(segment_between(scene.surfaces, known_of(s), scratch.sites[s]));
+  }
+  scratch.is_blocked.resize(scratch.sites.size());
+  scene.visibility.blocked(scratch.segments, scratch.is_blocked);
+  for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
+    if (scratch.is_blocked[s] && are_coplanar(known_of(s), scratch.sites[s])) scratch.sites[s] = known_of(s);
+  }
 }
 
 Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch,

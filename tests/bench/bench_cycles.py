@@ -60,13 +60,21 @@ class Bench:
             folder = self.out / f"reference_{seed}"
             self.submit(folder, *DENSE, "--seed", seed)
             maps.append(read(folder / "lightmap_0.exr"))
-        self.reference, self.scale = self.out / "reference.exr", 1
+        self.reference, self.scale = self.out / "reference_1" / "mean.exr", 1
         write(self.reference, (maps[0] + maps[1]) / 2)
         self.own_error = self.difference(self.out / "reference_1" / "lightmap_0.exr")
 
     def difference(self, path, scale=1):
-        """Relative RMSE of a map of irradiance in lx x scale, as measured."""
-        text, _ = measured([self.bin / "radbake", "compare", self.reference, path, "--scale", 1 / self.scale / scale, "--json"])
+        """Relative RMSE of a map of irradiance in lx x scale, as measured: of texels that bakes of ours did measure, and
+        not only fill from their neighbours."""
+        errors = [p.parent / "error_0.exr" for p in (self.reference, path) if (p.parent / "error_0.exr").exists()]
+        options = []
+        if errors:
+            mask = np.min([read(p)[..., 3:] for p in errors], axis=0)
+            write(self.out / "mask.exr", np.repeat(mask, 3, axis=2))
+            options = ["--mask", self.out / "mask.exr"]
+        text, _ = measured([self.bin / "radbake", "compare", self.reference, path, "--scale", 1 / self.scale / scale,
+                            "--json", *options])
         return json.loads(text)["rrmse"]
 
     def true_error(self, path, scale=1):

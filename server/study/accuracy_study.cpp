@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "client/image/map_difference.h"
+#include "server/radiosity/plan/pass_plan.h"
 
 namespace radbake::study {
 namespace {
@@ -238,17 +239,23 @@ image::Pixels stacked_lightmaps(const std::vector<radiosity::Layer>& layers) {
 Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::BakeOptions& base,
                                          const ReferenceEffort& effort) {
   radiosity::BakeOptions options = base;
-  options.rays = effort.rays;
-  options.light_samples = effort.light_samples;
+  options.rays = options.light_samples = 0;
   options.max_patches = effort.max_patches;
   options.spacing = 1;
   options.form_factors = radiosity::FormFactors::kAdaptive;
   options.solver = radiosity::Solver::kKrylov;
   options.max_error = options.time_budget_seconds = 0;
+  constexpr std::uint64_t kRefined = 16;  // patches in the place of one
   const auto by_formula = radiosity::plan_scene(scene, options);
-  if (!by_formula.ok() || by_formula->plan.num_patches > kMaxPatchesByFormula) {
+  const auto most = static_cast<std::uint64_t>(effort.max_patches);
+  if (!by_formula.ok() || std::min(kRefined * by_formula->plan.num_patches, most) > kMaxPatchesByFormula) {
     options.form_factors = radiosity::FormFactors::kHemicube;
   }
+  // A small pass, and a large one with patches of a quarter of the side.
+  const radiosity::PassSettings one = radiosity::pass_of({});
+  const double rays = static_cast<double>(effort.rays) / one.rays_per_texel;
+  const double samples = static_cast<double>(effort.light_samples) / one.light_samples;
+  options.replay = {{1, 1, false}, {1, 1, true}, {rays, samples, true}};
   AccuracyReference reference;
   image::Pixels maps[2];
   for (const std::uint64_t half : {std::uint64_t{0}, std::uint64_t{1}}) {
@@ -268,10 +275,10 @@ Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::Ba
   // rms(a - b) / 2 = rms(a - (a + b) / 2).
   RADBAKE_ASSIGN_OR_RETURN(const image::MapDifference half, image::compare_maps({reference.map, maps[0]}, mask));
   reference.error = half.relative_rmse;
-  char text[300];
+  char text[400];
   std::snprintf(text, sizeof text,
-                "the mean of two bakes with other seeds, of %d rays and %d light samples at every texel, at most %d "
-                "patches, form factors `%s` and solver `krylov`",
+                "the mean of two bakes with other seeds, of %d rays and %d light samples at every texel, patches of a "
+                "quarter of the usual side and at most %d, form factors `%s` and solver `krylov`",
                 effort.rays, effort.light_samples, effort.max_patches,
                 radiosity::form_factors_name(options.form_factors));
   reference.origin = text;

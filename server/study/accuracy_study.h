@@ -60,15 +60,16 @@ struct AccuracyReference {
 struct ReferenceEffort {
   int rays = 8192;
   int light_samples = 4096;
-  int max_patches = 16384;
+  int max_patches = 65536;
 };
 
-/// Bakes a reference: two seeds, all texels gather, form factors of near pairs by formula (`adaptive`), or by hemicubes
-/// above 2000 patches and where light passes surfaces, which formulas do not know.
+/// Bakes a reference: two seeds, all texels gather, patches of a quarter of the usual side, form factors of near pairs
+/// by formula (`adaptive`), or by hemicubes above 2000 patches and where light passes surfaces, which formulas do not
+/// know.
 ///
 ///   reference = (a + b) / 2        its error = rms(a - b) / 2 / mean
 ///
-/// What both have in common is not in this error: the size of their patches. Errors: as bake_scene().
+/// What both have in common is not in this error: what is left of the size of their patches. Errors: as bake_scene().
 Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::BakeOptions& base,
                                          const ReferenceEffort& effort);
 

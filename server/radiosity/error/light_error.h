@@ -19,8 +19,8 @@ namespace radbake::radiosity {
 /// what linear interpolation leaves of the second differences between nodes. algebraic: the solver's bound on the
 /// patches' light, which no receiver's passes.
 /// low, high: 95 % interval of the error that the light has. Its square varies about its expected value as the
-/// replicates' squares do about theirs (a Student factor of three degrees of freedom), a twentieth of the sampling error
-/// is what all replicates have in common, and the discretisation may be half or twice of what two levels tell.
+/// replicates' squares do about theirs (a Student factor of three degrees of freedom), a twentieth of the sampling
+/// error is what all replicates have in common, and the discretisation may be half or twice of what two levels tell.
 struct LightError {
   double relative_rmse = 0, low = 0, high = 0;
   double sampling = 0, discretisation = 0, algebraic = 0;

@@ -84,8 +84,8 @@ struct ReceiveScratch {
 Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch,
                   int light_samples = 0);
 
-/// Of scratch.sites, further places of a receiver that counts as a whole: puts `known` ones, which receive() has had, in
-/// the place of those that something parts from them.
+/// Of scratch.sites, further places of a receiver that counts as a whole: puts `known` ones, which receive() has had,
+/// in the place of those that something parts from them.
 void replace_unseen_sites(const GatherScene& scene, std::span<const Site> known, ReceiveScratch& scratch);
 
 }  // namespace radbake::radiosity

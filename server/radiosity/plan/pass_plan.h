@@ -42,9 +42,9 @@ struct PassResults {
   bool can_refine_patches = false;
 };
 
-/// A pass of a scale: 1 is the first pass, the coarsest that tells its own error. `patch_growth`: patches now over those
-/// of the first pass. What a texel gathers is a mean over all patches that it sees, so that their rows share the rays
-/// that fewer had.
+/// A pass of a scale: 1 is the first pass, the coarsest that tells its own error. `patch_growth`: patches now over
+/// those of the first pass. What a texel gathers is a mean over all patches that it sees, so that their rows share the
+/// rays that fewer had.
 PassSettings pass_of(const PassScale& scale, double patch_growth = 1);
 
 struct NextPass {
@@ -63,8 +63,8 @@ struct NoPass {
 /// effort, and the direct and the gathered part get what buys the most (the least cost c_d N_d + c_g N_g at which
 /// S_d / N_d + S_g / N_g is what the other errors leave of the target). It aims at 0.8 x the target and is done at 0.9.
 /// Where the patches' size leads the error and may be refined, the pass does. Each pass takes at most three times
-/// what all before it took; within a budget, the last one fills what is left. Time decides only how large a pass is and whether there is one. `no_pass` says why
-/// there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
+/// what all before it took; within a budget, the last one fills what is left. Time decides only how large a pass is and
+/// whether there is one. `no_pass` says why there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
 std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass);
 
 }  // namespace radbake::radiosity

@@ -117,11 +117,11 @@ std::string target_table(const AccuracyStudy& study, const AccuracyFront& front)
   for (const AccuracyRun& run : study.runs) {
     if (run.setting) continue;
     const auto fixed = front.error_at(last(run).cpu_seconds);
-    const std::string asked = run.budget > 0 ? print("`--time-budget %gs`", run.budget)
-                                             : print("`--max-error %g%%`", 100 * run.target);
+    const std::string asked =
+        run.budget > 0 ? print("`--time-budget %gs`", run.budget) : print("`--max-error %g%%`", 100 * run.target);
     text += "| " + asked + " | " + std::to_string(run.points.size()) + " | " + percent(last(run).stated) + " | " +
-            percent(last(run).error) + " | " + seconds(last(run).cpu_seconds) + " | " + seconds(last(run).seconds) + " | " +
-            (fixed ? percent(*fixed) : "nothing yet") + " |\n";
+            percent(last(run).error) + " | " + seconds(last(run).cpu_seconds) + " | " + seconds(last(run).seconds) +
+            " | " + (fixed ? percent(*fixed) : "nothing yet") + " |\n";
   }
   return text;
 }

@@ -5,8 +5,8 @@
 3 x 2.5 x 3 m: one wall has an opening for --sky and --sun; a screen of holes (alpha mask) stands before it, a blue sheet
 passes light, a double-sided panel stands amid; a lamp without size and a panel that glows. Equal bytes each time.
 """
+import argparse
 import struct
-import sys
 import zlib
 
 from make_interior import Glb
@@ -80,6 +80,6 @@ def main(path):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    main(sys.argv[1])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", metavar="OUT.glb")
+    main(parser.parse_args().out)

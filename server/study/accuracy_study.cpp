@@ -55,10 +55,10 @@ image::Pixels stacked_layers(const std::vector<radiosity::Layer>& layers, const 
   return stack;
 }
 
-/// Takes the coverage from texels that have no error of their own: filled ones, and emitters.
-void leave_out_filled(const image::Pixels& errors, image::Pixels& map) {
-  for (std::size_t k = 3; k < map.values.size() && k < errors.values.size(); k += 4) {
-    if (errors.values[k] == 0) map.values[k] = 0;
+/// Takes the coverage from texels where another image has none.
+void uncover(const image::Pixels& other, image::Pixels& map) {
+  for (std::size_t k = 3; k < map.values.size() && k < other.values.size(); k += 4) {
+    if (other.values[k] == 0) map.values[k] = 0;
   }
 }
 
@@ -263,14 +263,15 @@ Result<AccuracyReference> make_reference(const Scene& scene, const radiosity::Ba
     options.seed = base.seed + 1000003 * (half + 1);
     RADBAKE_ASSIGN_OR_RETURN(const MeasuredBake bake, bake_once(scene, options));
     maps[half] = stacked_lightmaps(bake.outcome.layers);
-    leave_out_filled(stacked_layers(bake.outcome.layers, "error_"), maps[half]);
+    // Filled texels and emitters have no error of their own.
+    uncover(stacked_layers(bake.outcome.layers, "error_"), maps[half]);
     reference.cpu_seconds += bake.cpu_seconds;
   }
   reference.map = maps[0];
   for (std::size_t k = 0; k < reference.map.values.size(); ++k) {
-    const bool is_left_out = k % 4 == 3 && (maps[0].values[k] == 0 || maps[1].values[k] == 0);
-    reference.map.values[k] = is_left_out ? 0 : (maps[0].values[k] + maps[1].values[k]) / 2;
+    reference.map.values[k] = (maps[0].values[k] + maps[1].values[k]) / 2;
   }
+  for (const image::Pixels& map : maps) uncover(map, reference.map);
   const auto mask = image::comparable_texels(reference.map, true);
   // rms(a - b) / 2 = rms(a - (a + b) / 2).
   RADBAKE_ASSIGN_OR_RETURN(const image::MapDifference half, image::compare_maps({reference.map, maps[0]}, mask));
@@ -314,20 +315,17 @@ Result<AccuracyStudy> study_accuracy(const Scene& scene, const AccuracySweep& sw
   for (const FixedSetting& fixed : sweep.settings) {
     RADBAKE_RETURN_IF_ERROR(run_one(fixed.options, setting_words(fixed.options), {fixed, 0, 0, {}}));
   }
-  for (const double target : sweep.targets) {
+  const auto run_progressive = [&](double target, double budget) {
     radiosity::BakeOptions options = sweep.base;
     options.max_error = target;
-    char what[60];
-    std::snprintf(what, sizeof what, "progressive, to %g %%", 100 * target);
-    RADBAKE_RETURN_IF_ERROR(run_one(options, what, {std::nullopt, target, 0, {}}));
-  }
-  for (const double budget : sweep.budgets) {
-    radiosity::BakeOptions options = sweep.base;
     options.time_budget_seconds = budget;
     char what[60];
-    std::snprintf(what, sizeof what, "progressive, for %g s", budget);
-    RADBAKE_RETURN_IF_ERROR(run_one(options, what, {std::nullopt, 0, budget, {}}));
-  }
+    std::snprintf(what, sizeof what, budget > 0 ? "progressive, for %g s" : "progressive, to %g %%",
+                  budget > 0 ? budget : 100 * target);
+    return run_one(options, what, {std::nullopt, target, budget, {}});
+  };
+  for (const double target : sweep.targets) RADBAKE_RETURN_IF_ERROR(run_progressive(target, 0));
+  for (const double budget : sweep.budgets) RADBAKE_RETURN_IF_ERROR(run_progressive(0, budget));
   if (study.runs.empty()) return invalid_argument("no setting could be baked; the first: " + study.left_out.front());
   return study;
 }

@@ -96,8 +96,9 @@ void LightmapGather::place_sites(const GatherScene& scene, const SobolPoints& po
   }
 }
 
-void LightmapGather::place_light_sites(int x, int y, int num_sites, std::uint64_t seed, Scratch& scratch) const {
-  const bool has_home = roles_.spacing() > 1 && roles_.home(x, y) != TexelRoles::kNoTriangle;
+void LightmapGather::place_light_sites(const GatherScene& scene, int x, int y, int num_sites, Scratch& scratch) const {
+  const bool has_home = roles_.home(x, y) != TexelRoles::kNoTriangle;
+  const std::uint64_t seed = seed_of(scene.seed, kSitesOfTexel, static_cast<std::uint64_t>(y) * atlas_.width() + x);
   scratch.receive.sites.clear();
   for (int s = 0; s < num_sites; ++s) {
     const std::uint64_t bits = mixed_bits(seed + static_cast<std::uint64_t>(s));
@@ -142,8 +143,7 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   if (rest > 0) {
     Replicates others;
     scratch.known_sites = scratch.receive.sites;
-    place_light_sites(x, y, num_light_sites(rest, scene.rows.replicates()), seed_of(scene.seed, kSitesOfTexel, id),
-                      scratch);
+    place_light_sites(scene, x, y, num_light_sites(rest, scene.rows.replicates()), scratch);
     replace_unseen_sites(scene, scratch.known_sites, scratch.receive);
     scratch.counts.num_light_rays +=
         scene.direct.estimate(scratch.receive.sites, scratch.none_is_out, seed_of(scene.seed, kMoreLightOfTexel, id),
@@ -271,10 +271,9 @@ void LightmapGather::gather_between(const GatherPass& pass, const std::vector<No
   const bool has_home = roles_.home(x, y) != TexelRoles::kNoTriangle;
   const int samples = light_samples_of(pass, id);
   const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
-  const int num_sites = num_light_sites(samples, static_cast<int>(num_replicates));
 
   if (!has_home) atlas_.footprint(x, y, scratch.footprint);
-  place_light_sites(x, y, num_sites, seed_of(scene.seed, kSitesOfTexel, id), scratch);
+  place_light_sites(scene, x, y, num_light_sites(samples, scene.rows.replicates()), scratch);
   if (facts.state == TexelState::kOutside) {
     const std::uint32_t t = scratch.receive.sites[0].point.triangle;
     facts.coverage = 1;

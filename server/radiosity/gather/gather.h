@@ -97,8 +97,8 @@ class LightmapGather {
   void judge_squares(const std::vector<NodeLight>& nodes);
   double interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const;
   void place_sites(const GatherScene& scene, const SobolPoints& points, int x, int y, Scratch& scratch) const;
-  /// Sites all over a texel, for direct light only. Precondition: it has a home, or its footprint is in `scratch`.
-  void place_light_sites(int x, int y, int num_sites, std::uint64_t seed, Scratch& scratch) const;
+  /// Sites all over a texel, for direct light only. Precondition: it has a home, or scratch.footprint is its own.
+  void place_light_sites(const GatherScene& scene, int x, int y, int num_sites, Scratch& scratch) const;
   /// The texel by itself: false where it covers nothing or is buried.
   bool gather_alone(const GatherPass& pass, const GatherScene& scene, const SobolPoints& points, int x, int y,
                     Scratch& scratch, NodeLight* node);

@@ -134,7 +134,8 @@ class Pilot {
                             surfaces_.sky, prepared_.options.seed};
     const double start = thread_cpu_seconds();
     if (!place_sites(index, footprint, scratch)) return std::nullopt;
-    const Reception reception = receive(scene, seed_of(prepared_.options.seed, kRays, index),
+    Receiver receiver{index, [&](double u, double v) { return site_at(index, footprint, u, v); }};
+    const Reception reception = receive(scene, receiver, seed_of(prepared_.options.seed, kRays, index),
                                         seed_of(prepared_.options.seed, kLight, index), scratch);
     return Trial{thread_cpu_seconds() - start, 0, static_cast<double>(reception.rays),
                  static_cast<double>(reception.light_rays)};
@@ -150,18 +151,17 @@ class Pilot {
       if (footprint.is_empty()) return false;
     }
     for (int s = 0; s < site_points_.size(); ++s) {
-      double u = site_points_.coordinate(s, 0, seeds), v = site_points_.coordinate(s, 1, seeds);
-      SurfacePoint p;
-      if (prepared_.atlas) {
-        p = footprint.sample(u, v);
-      } else {
-        // Somewhere on the first triangle of the vertex: rays cost the same there.
-        if (u + v > 1) u = 1 - u, v = 1 - v;
-        p = {prepared_.groups->corners[prepared_.groups->first_corner[index]] / 3, u, v};
-      }
-      scratch.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+      scratch.sites.push_back(
+          site_at(index, footprint, site_points_.coordinate(s, 0, seeds), site_points_.coordinate(s, 1, seeds)));
     }
     return true;
+  }
+
+  Site site_at(std::size_t index, const Footprint& footprint, double u, double v) const {
+    if (prepared_.atlas) return front_site(surfaces_, footprint.sample(u, v));
+    // Somewhere on the first triangle of the vertex: rays cost the same there.
+    if (u + v > 1) u = 1 - u, v = 1 - v;
+    return front_site(surfaces_, {prepared_.groups->corners[prepared_.groups->first_corner[index]] / 3, u, v});
   }
 
   const Preparation& prepared_;

@@ -161,7 +161,6 @@ void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& s
     own.first_arrival = num_arrivals;
     own.first_escape = static_cast<std::uint32_t>(row.escapes.size());
     own.counted = static_cast<std::uint32_t>(scratch.end_of_site[s] - k);
-    std::uint32_t enclosing = 0;
     for (; k < scratch.end_of_site[s]; ++k) {
       const Hit& hit = hits[k];
       if (k + kAhead < hits.size() && hits[k + kAhead].triangle != kNoHit) {
@@ -175,15 +174,15 @@ void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& s
       own.near += hit.distance < near_distance_;
       const Patches::Meeting met = patches_.meet(hit, scratch.rays[k].direction, surfaces_);
       own.backs += met.is_back;
-      enclosing += is_enclosing(hit, met);
+      own.enclosing += is_enclosing(hit, met);
       row.arrivals[num_arrivals] = met.patch;
       num_arrivals += met.patch != kNoPatch;
     }
     own.num_arrivals = num_arrivals - own.first_arrival;
-    if (2 * enclosing <= own.counted) continue;
+    if (2 * own.enclosing <= own.counted) continue;
     row.is_buried[s] = 1;
     counted += own.counted;
-    free += own.counted - enclosing;
+    free += own.counted - own.enclosing;
   }
   row.arrivals.resize(num_arrivals);
 

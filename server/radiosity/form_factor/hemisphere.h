@@ -20,7 +20,8 @@ struct RowSample {
     std::uint32_t escaped = 0;
     std::uint32_t near = 0;  ///< rays that met anything within the asked distance
     std::uint32_t counted = 0;
-    std::uint32_t backs = 0;  ///< rays that met a back, of single- or double-sided surfaces
+    std::uint32_t backs = 0;      ///< rays that met a back, of single- or double-sided surfaces
+    std::uint32_t enclosing = 0;  ///< of those, that met one which nobody is meant to see: single-sided, stops light
   };
   std::vector<std::uint32_t> arrivals;  ///< patch of each ray that met one, in the order of the rays
   std::vector<std::uint32_t> escapes;   ///< rays that met nothing, into Scratch::rays, in their order

@@ -78,6 +78,10 @@ LightmapGather::LightmapGather(const Surfaces& surfaces, const Atlas& atlas, con
       facts_(estimate_.size()),
       cell_has_light_(estimate_.num_cells()) {}
 
+Site LightmapGather::site_at(const Footprint& footprint, double u, double v) const {
+  return front_site(surfaces_, footprint.sample(u, v));
+}
+
 int LightmapGather::light_samples_of(const GatherPass& pass, std::size_t texel) const {
   const int replicates = pass.alone.rows.replicates();
   return pass.light_levels.empty() ? pass.light_samples : replicates << pass.light_levels[texel];
@@ -90,8 +94,8 @@ void LightmapGather::place_sites(const GatherScene& scene, const SobolPoints& po
   for (int r = 0; r < scene.rows.replicates(); ++r) {
     const auto seeds = SobolPoints::seeds_of(mixed_bits(seed + static_cast<std::uint64_t>(r)));
     for (int s = 0; s < points.size(); ++s) {
-      const SurfacePoint p = scratch.footprint.sample(points.coordinate(s, 0, seeds), points.coordinate(s, 1, seeds));
-      scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+      scratch.receive.sites.push_back(
+          site_at(scratch.footprint, points.coordinate(s, 0, seeds), points.coordinate(s, 1, seeds)));
     }
   }
 }
@@ -103,8 +107,8 @@ void LightmapGather::place_light_sites(const GatherScene& scene, int x, int y, i
   for (int s = 0; s < num_sites; ++s) {
     const std::uint64_t bits = mixed_bits(seed + static_cast<std::uint64_t>(s));
     const double u = static_cast<double>(bits >> 32) * 0x1p-32, v = static_cast<double>(bits & 0xffffffffu) * 0x1p-32;
-    const SurfacePoint p = has_home ? roles_.point_at_home(x, y, u, v) : scratch.footprint.sample(u, v);
-    scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+    scratch.receive.sites.push_back(has_home ? front_site(surfaces_, roles_.point_at_home(x, y, u, v))
+                                             : site_at(scratch.footprint, u, v));
   }
   scratch.none_is_out.assign(scratch.receive.sites.size(), 0);
 }
@@ -120,11 +124,16 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   facts.is_emitter = std::any_of(scratch.footprint.pieces.begin(), scratch.footprint.pieces.end(),
                                  [&](const FootprintPiece& piece) { return surfaces_.is_emitter[piece.triangle]; });
   place_sites(scene, points, x, y, scratch);
-  // The sites that rays leave from send shadow rays too, as many as is of use there.
+  Receiver receiver{id, [this, &scratch](double u, double v) { return site_at(scratch.footprint, u, v); }, facts.parts};
+  // The sites that rays leave from send shadow rays too, as many as is of use there; of a part, all of them.
   const int samples = light_samples_of(pass, id);
-  const int of_sites = std::min(samples, kSamplesPerSite * static_cast<int>(scratch.receive.sites.size()));
-  const Reception reception = receive(scene, seed_of(scene.seed, kRaysOfTexel, id),
+  const int of_sites = facts.parts == Receiver::Parts::kSeveral
+                           ? samples
+                           : std::min(samples, kSamplesPerSite * static_cast<int>(scratch.receive.sites.size()));
+  const Reception reception = receive(scene, receiver, seed_of(scene.seed, kRaysOfTexel, id),
                                       seed_of(scene.seed, kLightOfTexel, id), scratch.receive, of_sites);
+  if (facts.parts == Receiver::Parts::kOne && receiver.parts == Receiver::Parts::kSeveral) estimate_.forget(id);
+  facts.parts = receiver.parts;
   scratch.counts.num_rays += reception.rays;
   scratch.counts.num_light_rays += reception.light_rays;
   ++scratch.counts.num_gathered;

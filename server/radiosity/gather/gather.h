@@ -26,6 +26,7 @@ struct GatheredTile {
 struct TexelFacts {
   TexelState state = TexelState::kOutside;
   bool is_emitter = false;
+  Receiver::Parts parts = Receiver::Parts::kUnknown;
   float coverage = 0;
   float area = 0;  ///< of its footprint, scene units squared
 };
@@ -96,6 +97,8 @@ class LightmapGather {
                     std::vector<NodeLight>& nodes, GatherCounts& counts);
   void judge_squares(const std::vector<NodeLight>& nodes);
   double interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const;
+  /// (u, v) in the unit square.
+  Site site_at(const Footprint& footprint, double u, double v) const;
   void place_sites(const GatherScene& scene, const SobolPoints& points, int x, int y, Scratch& scratch) const;
   /// Sites all over a texel, for direct light only. Precondition: it has a home, or scratch.footprint is its own.
   void place_light_sites(const GatherScene& scene, int x, int y, int num_sites, Scratch& scratch) const;

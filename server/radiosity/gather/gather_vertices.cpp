@@ -76,6 +76,7 @@ VertexGather::VertexGather(const Surfaces& surfaces, const VertexGroups& groups)
     : surfaces_(surfaces),
       groups_(groups),
       estimate_(groups.size(), groups.size(), false, false),
+      parts_(groups.size(), Receiver::Parts::kUnknown),
       is_known_(groups.size(), 0) {}
 
 void VertexGather::add_pass(const GatherScene& scene, int light_samples, double weight,
@@ -97,17 +98,22 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
         area += surfaces_.areas[groups_.corners[c] / 3];
         scratch.area_up_to.push_back(area);
       }
+      Receiver receiver{
+          g,
+          [&](double x, double y) { return front_site(surfaces_, sample_near(groups_, g, scratch.area_up_to, x, y)); },
+          parts_[g]};
       scratch.receive.sites.clear();
       for (std::size_t r = 0; r < num_replicates; ++r) {
         const auto seeds = SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfVertex, g) + r));
         for (int s = 0; s < site_points.size(); ++s) {
-          const SurfacePoint p = sample_near(groups_, g, scratch.area_up_to, site_points.coordinate(s, 0, seeds),
-                                             site_points.coordinate(s, 1, seeds));
-          scratch.receive.sites.push_back(front_site(surfaces_, p, surfaces_.shading_normal(p)));
+          scratch.receive.sites.push_back(
+              receiver.site_at(site_points.coordinate(s, 0, seeds), site_points.coordinate(s, 1, seeds)));
         }
       }
-      const Reception reception = receive(scene, seed_of(scene.seed, kRaysOfVertex, g),
+      const Reception reception = receive(scene, receiver, seed_of(scene.seed, kRaysOfVertex, g),
                                           seed_of(scene.seed, kLightOfVertex, g), scratch.receive, light_samples);
+      if (parts_[g] == Receiver::Parts::kOne && receiver.parts == Receiver::Parts::kSeveral) estimate_.forget(g);
+      parts_[g] = receiver.parts;
       num_rays += reception.rays;
       num_light_rays += reception.light_rays;
       is_known_[g] = !reception.is_buried;

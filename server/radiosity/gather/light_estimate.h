@@ -62,6 +62,8 @@ class LightEstimate {
   /// `gathered_weight`: of this pass.
   void begin_pass(double gathered_weight) { pass_weight_ = gathered_weight; }
   void add(std::size_t receiver, const PassLight& light, double direct_weight);
+  /// What passes so far found of a receiver does not count.
+  void forget(std::size_t receiver) { direct_weight_[receiver] = 0; }
   void end_pass() { gathered_weight_ += pass_weight_; }
   /// What passes so far gathered does not count any more.
   void forget_gathered() { gathered_weight_ = 0; }

@@ -6,6 +6,9 @@
 #include <numbers>
 #include <optional>
 
+#include "common/base/sequence.h"
+#include "server/radiosity/gather/parting.h"
+
 namespace radbake::radiosity {
 namespace {
 
@@ -13,7 +16,9 @@ namespace {
 constexpr double kMinVisibleShare = 0.125;
 /// Where less is visible, the part that is gets all of the receiver's rays.
 constexpr double kRetracedShare = 0.5;
-constexpr std::uint32_t kNoPart = std::numeric_limits<std::uint32_t>::max();
+/// Fixed places that tell whether anything stands across a receiver, and those that its parts are made of: both powers
+/// of 2, so that they are evenly spread.
+constexpr int kFirstLook = 16, kFixedPlaces = 64;
 
 /// Sites of one replicate.
 std::size_t sites_each(const GatherScene& scene, const ReceiveScratch& scratch) {
@@ -47,93 +52,6 @@ void leave_out_sealed(const GatherScene& scene, std::uint64_t light_seed, Receiv
   if (!(direct == Vec3{})) return;
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) scratch.is_out[s] |= !is_other[s];
 }
-
-/// Whether two sites lie in one plane, as far as a segment between them tells whether something stands there.
-bool are_coplanar(const Site& a, const Site& b) {
-  constexpr double kFlat = 1e-3;
-  const Vec3 between = b.position - a.position;
-  const double limit = kFlat * length(between);
-  return std::fabs(dot(between, a.facing)) <= limit && std::fabs(dot(between, b.facing)) <= limit &&
-         dot(a.facing, b.facing) > 0;
-}
-
-/// From one site to another, just above the surface.
-Ray segment_between(const Surfaces& surfaces, const Site& a, const Site& b) {
-  Ray segment;
-  segment.origin = lifted_origin(surfaces, a.position, a.facing, a.point.triangle);
-  const auto end = lifted_origin(surfaces, b.position, b.facing, b.point.triangle);
-  for (int axis = 0; axis < 3; ++axis) segment.direction[axis] = end[axis] - segment.origin[axis];
-  segment.max_distance = 1;
-  return segment;
-}
-
-/// Parts the sites by what stands between them, seen just above the surface. A site that cannot be seen from the first
-/// of a part is tried from a few others of it.
-class Parting {
- public:
-  Parting(const GatherScene& scene, ReceiveScratch& scratch) : scene_(scene), scratch_(scratch) {}
-
-  /// Numbers the parts in scratch.part. Returns how many sites each has.
-  std::vector<std::uint32_t> find_parts() {
-    scratch_.part.assign(scratch_.sites.size(), kNoPart);
-    std::vector<std::uint32_t> sizes;
-    for (std::uint32_t s = 0; s < scratch_.sites.size(); ++s) {
-      if (scratch_.is_out[s] || scratch_.part[s] != kNoPart) continue;
-      grow(s, static_cast<std::uint32_t>(sizes.size()));
-      sizes.push_back(0);
-    }
-    for (const std::uint32_t part : scratch_.part) {
-      if (part != kNoPart) ++sizes[part];
-    }
-    return sizes;
-  }
-
- private:
-  void grow(std::uint32_t first, std::uint32_t part) {
-    constexpr int kTries = 4;
-    scratch_.part[first] = part;
-    std::uint32_t from = first;
-    for (int attempt = 0; attempt < kTries; ++attempt) {
-      const std::uint32_t found = reach(from, part);
-      if (found == kNoPart) return;  // nobody is left
-      from = found;
-    }
-  }
-
-  /// Takes what is seen from a site into its part. Returns the last one taken, or `from`; kNoPart: all have a part.
-  std::uint32_t reach(std::uint32_t from, std::uint32_t part) {
-    scratch_.segments.clear();
-    targets_.clear();
-    std::uint32_t last = from;
-    bool is_anybody_left = false;
-    const Site& a = scratch_.sites[from];
-    for (std::uint32_t s = 0; s < scratch_.sites.size(); ++s) {
-      if (scratch_.is_out[s] || scratch_.part[s] != kNoPart) continue;
-      const Site& b = scratch_.sites[s];
-      if (!are_coplanar(a, b)) {
-        scratch_.part[s] = part;
-        continue;
-      }
-      scratch_.segments.push_back(segment_between(scene_.surfaces, a, b));
-      targets_.push_back(s);
-    }
-    scratch_.is_blocked.resize(targets_.size());
-    scene_.visibility.blocked(scratch_.segments, scratch_.is_blocked);
-    for (std::size_t k = 0; k < targets_.size(); ++k) {
-      if (scratch_.is_blocked[k]) {
-        is_anybody_left = true;
-      } else {
-        scratch_.part[targets_[k]] = part;
-        last = targets_[k];
-      }
-    }
-    return is_anybody_left ? last : kNoPart;
-  }
-
-  const GatherScene& scene_;
-  ReceiveScratch& scratch_;
-  std::vector<std::uint32_t> targets_;
-};
 
 /// What the patches and the sky send along the rays of a replicate, from its sites that are not out. Without any,
 /// empty.
@@ -227,39 +145,13 @@ double openness_of(const ReceiveScratch& scratch) {
   return counted > 0 ? 1 - static_cast<double>(near) / static_cast<double>(counted) : 0;
 }
 
-/// Leaves all parts out but the darkest of those that are large enough to be measured.
-void keep_darkest_part(const GatherScene& scene, std::uint64_t light_seed, int light_samples, ReceiveScratch& scratch,
-                       Reception& out) {
-  const std::vector<std::uint32_t> sizes = Parting(scene, scratch).find_parts();
-  if (sizes.size() <= 1) return;
-  const std::vector<std::uint8_t> is_buried = scratch.is_out;
-  const auto keep = [&](std::uint32_t part) {
-    for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
-      scratch.is_out[s] = is_buried[s] || scratch.part[s] != part;
-    }
-  };
-  auto kept = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
-  double least = std::numeric_limits<double>::infinity();
-  for (std::uint32_t part = 0; part < sizes.size(); ++part) {
-    if (sizes[part] < kMinVisibleShare * static_cast<double>(scratch.sites.size())) continue;
-    keep(part);
-    light_of(scene, light_seed, light_samples, scratch, out);
-    const double light = max_component(out.mean(scene.rows.replicates()).irradiance());
-    if (light >= least) continue;
-    least = light;
-    kept = part;
-  }
-  keep(kept);
-}
-
 /// Traces the sites' rows and marks what does not count. Returns the share that does.
 double trace_and_sort_out(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed,
-                          int light_samples, ReceiveScratch& scratch, Reception& out) {
+                          ReceiveScratch& scratch, Reception& out) {
   scene.rows.sample_row(scratch.sites, rays_seed, scratch.hemisphere, scratch.row);
   out.rays += scratch.row.traced;
   scratch.is_out = scratch.row.is_buried;
   leave_out_sealed(scene, light_seed, scratch, out);
-  keep_darkest_part(scene, light_seed, light_samples, scratch, out);
   const auto num_out = std::count(scratch.is_out.begin(), scratch.is_out.end(), 1);
   return 1 - static_cast<double>(num_out) / static_cast<double>(scratch.sites.size());
 }
@@ -271,6 +163,91 @@ void repeat_visible_sites(ReceiveScratch& scratch) {
     if (!scratch.is_out[s]) visible.push_back(scratch.sites[s]);
   }
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) scratch.sites[s] = visible[s % visible.size()];
+}
+
+/// Places of a receiver that depend on nothing else. count: up to kFixedPlaces.
+void place_fixed(const Receiver& receiver, int count, std::vector<Site>& places) {
+  static const SobolPoints points(kFixedPlaces);
+  const auto seeds = SobolPoints::seeds_of(mixed_bits(receiver.id));
+  places.clear();
+  for (int k = 0; k < count; ++k) {
+    places.push_back(receiver.site_at(points.coordinate(k, 0, seeds), points.coordinate(k, 1, seeds)));
+  }
+}
+
+struct Seeds {
+  std::uint64_t rays, light;
+};
+
+/// The light at scratch.sites, which are `share` of a receiver and on one side of what may stand across it.
+Reception receive_part(const GatherScene& scene, double share, Seeds seeds, int light_samples,
+                       ReceiveScratch& scratch) {
+  Reception out;
+  const double visible = trace_and_sort_out(scene, seeds.rays, seeds.light, scratch, out);
+  out.visible_share = visible * share;
+  if (out.visible_share < kMinVisibleShare) return out;
+  if (visible < kRetracedShare) {
+    repeat_visible_sites(scratch);
+    trace_and_sort_out(scene, seeds.rays, seeds.light, scratch, out);
+  }
+  light_of(scene, seeds.light, light_samples, scratch, out);
+  out.openness = openness_of(scratch);
+  out.is_buried = false;
+  return out;
+}
+
+/// Whether a part is behind the scenes: nearly all that it sees are backs that nobody is meant to see.
+bool is_behind_scenes(const ReceiveScratch& scratch) {
+  constexpr double kNearlyAll = 0.75;
+  std::uint64_t counted = 0, enclosing = 0;
+  for (const RowSample::SiteRays& own : scratch.row.of_site) {
+    counted += own.counted;
+    enclosing += own.enclosing;
+  }
+  return static_cast<double>(enclosing) > kNearlyAll * static_cast<double>(counted);
+}
+
+/// Of the parts that are large enough to be measured, the darkest one's light. Parts are made of fixed places. One that
+/// is behind the scenes counts only where all are: how much light finds a way there, and whether that is enough not to
+/// be buried, is a matter of few rays, and no picture shows it.
+Reception receive_darkest_part(const GatherScene& scene, const Receiver& receiver, Seeds seeds, int light_samples,
+                               ReceiveScratch& scratch) {
+  const std::size_t num_sites = scratch.sites.size();
+  place_fixed(receiver, kFixedPlaces, scratch.places);
+  const auto sizes = find_parts(scene.surfaces, scene.visibility, scratch.places, scratch.parting);
+  const std::vector<std::uint32_t> part_of = scratch.parting.part;
+  const auto largest = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+  Reception darkest;
+  std::uint64_t rays = 0, light_rays = 0;
+  double least = std::numeric_limits<double>::infinity();
+  bool is_any_seen = false;
+  std::vector<Site> own;
+  for (std::uint32_t part = 0; part < sizes.size(); ++part) {
+    const double share = static_cast<double>(sizes[part]) / static_cast<double>(scratch.places.size());
+    if (part != largest && share < kMinVisibleShare) continue;
+    own.clear();
+    for (std::size_t k = 0; k < scratch.places.size(); ++k) {
+      if (part_of[k] == part) own.push_back(scratch.places[k]);
+    }
+    // Which places are which replicate's differs from pass to pass.
+    scratch.sites.clear();
+    for (std::size_t s = 0; s < num_sites; ++s)
+      scratch.sites.push_back(own[(seeds.rays % own.size() + s) % own.size()]);
+    const Reception reception = receive_part(scene, share, seeds, light_samples, scratch);
+    rays += reception.rays;
+    light_rays += reception.light_rays;
+    if (reception.is_buried) continue;
+    const bool is_seen = !is_behind_scenes(scratch);
+    const double light = max_component(reception.mean(scene.rows.replicates()).irradiance());
+    if (is_any_seen && !is_seen) continue;
+    if (light >= least && is_seen == is_any_seen) continue;
+    is_any_seen |= is_seen;
+    least = light;
+    darkest = reception;
+  }
+  darkest.rays = rays;
+  darkest.light_rays = light_rays;
+  return darkest;
 }
 
 }  // namespace
@@ -300,20 +277,22 @@ void replace_unseen_sites(const GatherScene& scene, std::span<const Site> known,
   }
 }
 
-Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch,
-                  int light_samples) {
-  Reception out;
-  // Find the part that counts.
-  out.visible_share = trace_and_sort_out(scene, rays_seed, light_seed, light_samples, scratch, out);
-  if (out.visible_share < kMinVisibleShare) return out;
-  if (out.visible_share < kRetracedShare) {
-    repeat_visible_sites(scratch);
-    trace_and_sort_out(scene, rays_seed, light_seed, light_samples, scratch, out);
+Reception receive(const GatherScene& scene, Receiver& receiver, std::uint64_t rays_seed, std::uint64_t light_seed,
+                  ReceiveScratch& scratch, int light_samples) {
+  const auto is_one_part = [&](std::span<const Site> sites) {
+    return find_parts(scene.surfaces, scene.visibility, sites, scratch.parting).size() == 1;
+  };
+  const Seeds seeds{rays_seed, light_seed};
+  if (receiver.parts == Receiver::Parts::kUnknown) {
+    place_fixed(receiver, kFirstLook, scratch.places);
+    receiver.parts = is_one_part(scratch.places) ? Receiver::Parts::kOne : Receiver::Parts::kSeveral;
   }
-  light_of(scene, light_seed, light_samples, scratch, out);
-  out.openness = openness_of(scratch);
-  out.is_buried = false;
-  return out;
+  // The sites of every pass look for what the fixed places have missed.
+  if (receiver.parts == Receiver::Parts::kOne && !is_one_part(scratch.sites)) {
+    receiver.parts = Receiver::Parts::kSeveral;
+  }
+  if (receiver.parts == Receiver::Parts::kOne) return receive_part(scene, 1, seeds, light_samples, scratch);
+  return receive_darkest_part(scene, receiver, seeds, light_samples, scratch);
 }
 
 }  // namespace radbake::radiosity

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "server/radiosity/form_factor/hemisphere.h"
+#include "server/radiosity/gather/parting.h"
 #include "server/radiosity/lights/direct_light.h"
 #include "server/radiosity/patches/patches.h"
 
@@ -66,7 +68,19 @@ struct ReceiveScratch {
   std::vector<Ray> segments;
   std::vector<std::uint8_t> is_blocked;
   std::vector<std::uint8_t> is_out;
-  std::vector<std::uint32_t> part;
+  std::vector<Site> places;
+  PartingScratch parting;
+};
+
+/// What is the same about a receiver in every pass and with every seed.
+struct Receiver {
+  /// Whether anything stands across it.
+  enum class Parts : std::uint8_t { kUnknown, kOne, kSeveral };
+
+  std::uint64_t id = 0;  ///< tells it from others of the same bake
+  /// The place at (u, v) of the unit square, spread over the receiver by area.
+  std::function<Site(double u, double v)> site_at;
+  Parts parts = Parts::kUnknown;  ///< receive() finds out
 };
 
 /// Gathers the light at scratch.sites, which are spread over one receiver; each replicate has its share of them, in
@@ -79,10 +93,12 @@ struct ReceiveScratch {
 /// A site does not count where it is buried: inside a single-sided object, or inside a closed object of any kind that
 /// no light enters (the ground under a box that stands on it). Where something thin stands across the receiver, only
 /// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
-/// of a wall, or a mean of both, would be a leak. `rays_seed`, `light_seed`: what the receiver is.
+/// of a wall, or a mean of both, would be a leak. Its parts are made of places that are the same in every pass: decided
+/// anew by the sites of each, a part near an eighth would come and go, and no spread of replicates would tell.
+/// `rays_seed`, `light_seed`: what this pass of the receiver is.
 /// `light_samples`: shadow rays to emitters, of all replicates; 0: as many as scene.direct has.
-Reception receive(const GatherScene& scene, std::uint64_t rays_seed, std::uint64_t light_seed, ReceiveScratch& scratch,
-                  int light_samples = 0);
+Reception receive(const GatherScene& scene, Receiver& receiver, std::uint64_t rays_seed, std::uint64_t light_seed,
+                  ReceiveScratch& scratch, int light_samples = 0);
 
 /// Of scratch.sites, further places of a receiver that counts as a whole: puts `known` ones, which receive() has had,
 /// in the place of those that something parts from them.

@@ -19,6 +19,10 @@ struct Site {
 inline Site front_site(const Surfaces& surfaces, const SurfacePoint& p, Vec3 normal) {
   return {p, surfaces.position(p), surfaces.normals[p.triangle], normal};
 }
+/// The same about the interpolated normal.
+inline Site front_site(const Surfaces& surfaces, const SurfacePoint& p) {
+  return front_site(surfaces, p, surfaces.shading_normal(p));
+}
 inline Site side_site(const Surfaces& surfaces, const SurfacePoint& p, Vec3 facing) {
   return {p, surfaces.position(p), facing, facing};
 }

@@ -64,7 +64,8 @@ class ReceiverPoint {
     const GatherScene scene{surfaces, *visibility_, rows, direct, std::span(&sent, 1), surfaces.sky, seed};
     ReceiveScratch scratch;
     scratch.sites.assign(static_cast<std::size_t>(rows.num_sites()), site);
-    const Reception reception = receive(scene, mixed_bits(seed), mixed_bits(seed + 1000), scratch);
+    Receiver receiver{0, [&](double, double) { return site; }};
+    const Reception reception = receive(scene, receiver, mixed_bits(seed), mixed_bits(seed + 1000), scratch);
     EXPECT_FALSE(reception.is_buried);
     return reception.replicates[0].irradiance();
   }

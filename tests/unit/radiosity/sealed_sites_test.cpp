@@ -39,14 +39,15 @@ class BoxOnAFloor {
     const DirectLight direct(surfaces, *visibility_, kShadowRays);
     const std::vector<SentLight> sent = {{radiosity_}};
     const GatherScene scene{surfaces, *visibility_, rows, direct, sent, {}, 1, {}, kDark};
+    // The first triangles are the floor's, 4 m a side; the box stands in their middle.
+    Receiver receiver{0, [&](double u, double) {
+                        return front_site(surfaces, SurfacePoint{0, 0.01, 0.49 + 0.002 * u}, surfaces.normals[0]);
+                      }};
     scratch_.sites.clear();
     for (int s = 0; s < rows.num_sites(); ++s) {
-      // The first triangles are the floor's, 4 m a side; the box stands in their middle.
-      const double u = 0.5 + 0.002 * s / rows.num_sites();
-      const SurfacePoint p{0, 0.01, u - 0.01};
-      scratch_.sites.push_back(front_site(surfaces, p, surfaces.normals[0]));
+      scratch_.sites.push_back(receiver.site_at(static_cast<double>(s) / rows.num_sites(), 0));
     }
-    return receive(scene, 11, 12, scratch_);
+    return receive(scene, receiver, 11, 12, scratch_);
   }
 
   std::vector<Vec3>& radiosity() { return radiosity_; }

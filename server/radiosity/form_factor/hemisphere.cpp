@@ -119,32 +119,58 @@ bool HemisphereEstimator::has_way_out(const Scratch& scratch, std::span<const Hi
   }
   if (kLeak * escaped > counted) return true;
 
-  // Look from some of them along their normals.
-  const std::size_t num_looks = std::min(others.size(), kMostLooks);
+  const Looks looks = look_from(scratch, hits, others, [](Vec3 facing, Vec3) { return facing; });
+  return looks.num > 0 && kLeak * (escaped * looks.num + looks.open * others.size()) > counted * looks.num;
+}
+
+double HemisphereEstimator::hidden_share(const Scratch& scratch, const RowSample& row) const {
+  if (scratch.hits.empty()) return 0;
+  std::vector<std::size_t> others;
+  for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
+    const Hit& hit = scratch.hits[k];
+    if (hit.triangle == kNoHit) continue;
+    if (!is_enclosing(hit, patches_.meet(hit, scratch.rays[k].direction, surfaces_))) others.push_back(k);
+  }
+  const Looks looks = look_from(scratch, scratch.hits, others,
+                                [](Vec3 facing, Vec3 ray) { return ray - facing * (2 * dot(ray, facing)); });
+  double hidden = row.enclosing;
+  if (looks.num > 0) {
+    hidden += static_cast<double>(others.size()) * static_cast<double>(looks.num - looks.open) /
+              static_cast<double>(looks.num);
+  }
+  return hidden / static_cast<double>(scratch.hits.size());
+}
+
+template <typename Direction>
+HemisphereEstimator::Looks HemisphereEstimator::look_from(const Scratch& scratch, std::span<const Hit> hits,
+                                                          const std::vector<std::size_t>& from,
+                                                          const Direction& direction) const {
+  Looks out;
+  out.num = std::min(from.size(), kMostLooks);
   std::vector<Ray> looks;
-  for (std::size_t look = 0; look < num_looks; ++look) {
-    const std::size_t ray = others[look * others.size() / num_looks];
+  for (std::size_t look = 0; look < out.num; ++look) {
+    const std::size_t ray = from[look * from.size() / out.num];
     const Hit& hit = hits[ray];
     const auto& d = scratch.rays[ray].direction;
-    const Vec3 normal = surfaces_.normals[hit.triangle];
-    const Vec3 facing = dot(normal, {d[0], d[1], d[2]}) < 0 ? normal : -normal;
+    const Vec3 normal = surfaces_.normals[hit.triangle], along{d[0], d[1], d[2]};
+    const Vec3 facing = dot(normal, along) < 0 ? normal : -normal;
     const Vec3 at = surfaces_.position({hit.triangle, static_cast<double>(hit.u), static_cast<double>(hit.v)});
+    const Vec3 to = direction(facing, along);
     looks.push_back({lifted_origin(surfaces_, at, facing, hit.triangle),
-                     {static_cast<float>(facing.x), static_cast<float>(facing.y), static_cast<float>(facing.z)}});
+                     {static_cast<float>(to.x), static_cast<float>(to.y), static_cast<float>(to.z)}});
   }
-  std::vector<Hit> met(num_looks);
+  std::vector<Hit> met(out.num);
   visibility_.trace(looks, met);
-  std::uint64_t open = 0;
-  for (std::size_t look = 0; look < num_looks; ++look) {
+  for (std::size_t look = 0; look < out.num; ++look) {
     const Hit& hit = met[look];
-    open += hit.triangle == kNoHit || !is_enclosing(hit, patches_.meet(hit, looks[look].direction, surfaces_));
+    out.open += hit.triangle == kNoHit || !is_enclosing(hit, patches_.meet(hit, looks[look].direction, surfaces_));
   }
-  return num_looks > 0 && kLeak * (escaped * num_looks + open * others.size()) > counted * num_looks;
+  return out;
 }
 
 void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& scratch, std::span<const Hit> hits,
                                    RowSample& row) const {
-  row = {std::move(row.arrivals),  std::move(row.escapes), 0, 0, 0, 0,
+  row = {std::move(row.arrivals),  std::move(row.escapes), 0, 0, 0, 0, 0,
          std::move(row.is_buried), std::move(row.of_site), 1};
   row.escapes.clear();
   row.is_buried.assign(sites.size(), 0);
@@ -161,6 +187,7 @@ void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& s
     own.first_arrival = num_arrivals;
     own.first_escape = static_cast<std::uint32_t>(row.escapes.size());
     own.counted = static_cast<std::uint32_t>(scratch.end_of_site[s] - k);
+    std::uint32_t enclosing = 0;
     for (; k < scratch.end_of_site[s]; ++k) {
       const Hit& hit = hits[k];
       if (k + kAhead < hits.size() && hits[k + kAhead].triangle != kNoHit) {
@@ -174,15 +201,16 @@ void HemisphereEstimator::read_off(std::span<const Site> sites, const Scratch& s
       own.near += hit.distance < near_distance_;
       const Patches::Meeting met = patches_.meet(hit, scratch.rays[k].direction, surfaces_);
       own.backs += met.is_back;
-      own.enclosing += is_enclosing(hit, met);
+      enclosing += is_enclosing(hit, met);
       row.arrivals[num_arrivals] = met.patch;
       num_arrivals += met.patch != kNoPatch;
     }
     own.num_arrivals = num_arrivals - own.first_arrival;
-    if (2 * own.enclosing <= own.counted) continue;
+    row.enclosing += enclosing;
+    if (2 * enclosing <= own.counted) continue;
     row.is_buried[s] = 1;
     counted += own.counted;
-    free += own.counted - own.enclosing;
+    free += own.counted - enclosing;
   }
   row.arrivals.resize(num_arrivals);
 

@@ -20,8 +20,7 @@ struct RowSample {
     std::uint32_t escaped = 0;
     std::uint32_t near = 0;  ///< rays that met anything within the asked distance
     std::uint32_t counted = 0;
-    std::uint32_t backs = 0;      ///< rays that met a back, of single- or double-sided surfaces
-    std::uint32_t enclosing = 0;  ///< of those, that met one which nobody is meant to see: single-sided, stops light
+    std::uint32_t backs = 0;  ///< rays that met a back, of single- or double-sided surfaces
   };
   std::vector<std::uint32_t> arrivals;  ///< patch of each ray that met one, in the order of the rays
   std::vector<std::uint32_t> escapes;   ///< rays that met nothing, into Scratch::rays, in their order
@@ -29,6 +28,8 @@ struct RowSample {
   std::uint32_t absorbed = 0;           ///< rays that met the back of a single-sided surface
   std::uint32_t counted = 0;            ///< rays from sites that are not buried
   std::uint32_t traced = 0;
+  std::uint32_t enclosing =
+      0;  ///< of all sites' rays, those that met the back of something single-sided that stops light
   std::vector<std::uint8_t> is_buried;  ///< [sites]
   std::vector<SiteRays> of_site;        ///< [sites]
   double visible_share = 1;             ///< of the sites: those not buried
@@ -77,6 +78,10 @@ class HemisphereEstimator {
   /// replicates().
   void sample_row(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch, RowSample& row) const;
 
+  /// Of the last sample_row() with this scratch, the share of all sites' rays that end behind the scenes: on the back
+  /// of something single-sided that stops light, or on a surface from which, mirrored, they would go on to one.
+  double hidden_share(const Scratch& scratch, const RowSample& row) const;
+
   /// The same rays as the last sample_row() with this scratch, as this estimator's channel meets them; only those are
   /// traced that may differ.
   void sample_again(std::span<const Site> sites, Scratch& scratch, RowSample& row) const;
@@ -88,6 +93,14 @@ class HemisphereEstimator {
   /// does not face the back of something in its turn, as those inside of solids that cross do. `counted`: those rays.
   bool has_way_out(const Scratch& scratch, std::span<const Hit> hits, const RowSample& row,
                    std::uint64_t counted) const;
+  /// Of rays that start at hits of the last row's, along `direction` of the surface's facing normal and the ray, how
+  /// many meet something else than what encloses, or nothing. Looks from up to kMostLooks of `from`, evenly spread.
+  struct Looks {
+    std::size_t num = 0, open = 0;
+  };
+  template <typename Direction>
+  Looks look_from(const Scratch& scratch, std::span<const Hit> hits, const std::vector<std::size_t>& from,
+                  const Direction& direction) const;
   void read_off(std::span<const Site> sites, const Scratch& scratch, std::span<const Hit> hits, RowSample& row) const;
   void deal_rays(std::span<const Site> sites, std::uint64_t seed, Scratch& scratch) const;
 

@@ -196,20 +196,9 @@ Reception receive_part(const GatherScene& scene, double share, Seeds seeds, int 
   return out;
 }
 
-/// Whether a part is behind the scenes: nearly all that it sees are backs that nobody is meant to see.
-bool is_behind_scenes(const ReceiveScratch& scratch) {
-  constexpr double kNearlyAll = 0.75;
-  std::uint64_t counted = 0, enclosing = 0;
-  for (const RowSample::SiteRays& own : scratch.row.of_site) {
-    counted += own.counted;
-    enclosing += own.enclosing;
-  }
-  return static_cast<double>(enclosing) > kNearlyAll * static_cast<double>(counted);
-}
-
-/// Of the parts that are large enough to be measured, the darkest one's light. Parts are made of fixed places. One that
-/// is behind the scenes counts only where all are: how much light finds a way there, and whether that is enough not to
-/// be buried, is a matter of few rays, and no picture shows it.
+/// Of the parts that are large enough to be measured, the darkest one's light. Parts are made of fixed places. One whose
+/// rays nearly all end behind the scenes counts only where all parts' do: how much light finds a way there, and whether
+/// that is enough not to be buried, is a matter of few rays, and no picture shows it.
 Reception receive_darkest_part(const GatherScene& scene, const Receiver& receiver, Seeds seeds, int light_samples,
                                ReceiveScratch& scratch) {
   const std::size_t num_sites = scratch.sites.size();
@@ -220,6 +209,7 @@ Reception receive_darkest_part(const GatherScene& scene, const Receiver& receive
   Reception darkest;
   std::uint64_t rays = 0, light_rays = 0;
   double least = std::numeric_limits<double>::infinity();
+  constexpr double kNearlyAll = 0.75;
   bool is_any_seen = false;
   std::vector<Site> own;
   for (std::uint32_t part = 0; part < sizes.size(); ++part) {
@@ -237,7 +227,7 @@ Reception receive_darkest_part(const GatherScene& scene, const Receiver& receive
     rays += reception.rays;
     light_rays += reception.light_rays;
     if (reception.is_buried) continue;
-    const bool is_seen = !is_behind_scenes(scratch);
+    const bool is_seen = scene.rows.hidden_share(scratch.hemisphere, scratch.row) < kNearlyAll;
     const double light = max_component(reception.mean(scene.rows.replicates()).irradiance());
     if (is_any_seen && !is_seen) continue;
     if (light >= least && is_seen == is_any_seen) continue;

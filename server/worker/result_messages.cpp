@@ -186,6 +186,7 @@ v1::PassReport to_message(const radiosity::PassSummary& pass) {
   out.set_gathered_scale(pass.scale.gathered);
   out.set_direct_scale(pass.scale.direct);
   out.set_refines_patches(pass.scale.refines_patches);
+  out.set_interpolation_limit(pass.scale.interpolation_limit);
   out.set_is_partial(!pass.is_whole);
   return out;
 }

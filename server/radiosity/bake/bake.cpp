@@ -3,6 +3,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "server/radiosity/bake/lightmap_layers.h"
@@ -81,6 +82,9 @@ class Bake {
         outcome_.report.error.predicted = next.predicted_error;
       }
       if (!finish_.stop_requested()) {
+        if (next.scale.interpolation_limit > 0) {
+          passes_.stop_interpolating_above(next.scale.interpolation_limit * mean_irradiance_);
+        }
         if (next.scale.refines_patches) refine_patches();
         const double growth = static_cast<double>(prepared_.patches.size()) / static_cast<double>(num_first_patches);
         RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(next.scale, growth), next.scale, next.share_of_rest));
@@ -102,6 +106,25 @@ class Bake {
     passes_.refine_patches(max_refined_patches());
     outcome_.report.num_patches = prepared_.patches.size();
     results_.gathered_effort = results_.gathered_rays = 0;
+  }
+
+  /// What would be gained where texels that interpolation puts off the most gathered alone.
+  void look_for_interpolation(const LightError& error) {
+    // Second differences of nodes tell it once their noise is not far above what is asked.
+    constexpr double kShare = 0.4, kNoise = 1.25, kWorth = 0.05;
+    const double aim = options_.max_error > 0 ? options_.max_error : error.relative_rmse;
+    const double limit = kShare * aim;
+    results_.refinable_interpolation = results_.interpolation_limit = 0;
+    results_.num_refinable_texels = 0;
+    results_.num_texels = error.num_receivers;
+    if (error.gathered_sampling > kNoise * aim || error.num_receivers == 0) return;
+    const LightmapGather::Interpolation above = passes_.interpolation_above(limit * error.mean_irradiance);
+    const double square = std::max(0.0, above.squares) / static_cast<double>(error.num_receivers) /
+                          (error.mean_irradiance * error.mean_irradiance);
+    if (square < kWorth * aim * aim) return;
+    results_.refinable_interpolation = std::sqrt(square);
+    results_.interpolation_limit = limit;
+    results_.num_refinable_texels = above.num_texels;
   }
 
   /// Smaller than 1 where the first pass might take most of the time budget.
@@ -167,6 +190,8 @@ class Bake {
     results_.direct_deviation = passes_.lightmaps() ? error.direct_deviation : 0;
     results_.discretisation = error.discretisation;
     results_.algebraic = error.algebraic;
+    mean_irradiance_ = error.mean_irradiance;
+    look_for_interpolation(error);
     ++results_.num_passes;
     results_.direct_effort += scale.direct;
     results_.gathered_effort += scale.gathered;
@@ -255,6 +280,7 @@ class Bake {
   PassRunner passes_;
   bool has_ended_early_ = false;
   PassResults results_;
+  double mean_irradiance_ = 0;  ///< of the map so far, lx
   BakeOutcome outcome_;
 };
 

@@ -42,6 +42,14 @@ class PassRunner {
   /// Patches half as long a side, and nothing gathered from the larger ones.
   void refine_patches(std::size_t max_patches);
 
+  /// As LightmapGather's; nothing where there are no lightmaps.
+  LightmapGather::Interpolation interpolation_above(double limit) const {
+    return lightmaps_ ? lightmaps_->interpolation_above(limit) : LightmapGather::Interpolation{};
+  }
+  void stop_interpolating_above(double limit) {
+    if (lightmaps_) lightmaps_->stop_interpolating_above(limit);
+  }
+
   LightError error() const;
   const std::optional<LightmapGather>& lightmaps() const { return lightmaps_; }
   const std::optional<VertexGather>& vertices() const { return vertices_; }

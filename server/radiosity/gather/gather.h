@@ -72,6 +72,16 @@ class LightmapGather {
     spread_.forget();
   }
 
+  /// Squares of texels whose light is further off than a limit because it is interpolated.
+  struct Interpolation {
+    double squares = 0;            ///< of what their texels that count are off by, summed, mean of the channels, lx^2
+    std::uint64_t num_texels = 0;  ///< that count
+  };
+  /// limit: root mean square over a square and those beside it, lx.
+  Interpolation interpolation_above(double limit) const;
+  /// Texels of such squares gather alone from the next pass on; what was interpolated there does not count any more.
+  void stop_interpolating_above(double limit);
+
   const Atlas& atlas() const { return atlas_; }
   const LightEstimate& estimate() const { return estimate_; }
   const std::vector<TexelFacts>& facts() const { return facts_; }
@@ -97,6 +107,10 @@ class LightmapGather {
                     std::vector<NodeLight>& nodes, GatherCounts& counts);
   void judge_squares(const std::vector<NodeLight>& nodes);
   double interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const;
+  std::size_t cell_of_square(int i, int j) const;
+  /// Calls back with (i, j) of each plain square that is off by more than the limit.
+  template <typename OnSquare>
+  void for_each_square_above(double limit, const OnSquare& on_square) const;
   /// (u, v) in the unit square.
   Site site_at(const Footprint& footprint, double u, double v) const;
   void place_sites(const GatherScene& scene, const SobolPoints& points, int x, int y, Scratch& scratch) const;

@@ -66,18 +66,19 @@ LightEstimate::LightEstimate(std::size_t num_receivers, std::size_t num_cells, b
       direct_variance_(3 * num_receivers),
       gathered_variance_(3 * num_receivers),
       direct_weight_(num_receivers),
+      has_gathered_(num_receivers, 0),
       patch_square_(num_cells),
       interpolation_square_(num_cells) {}
 
 void LightEstimate::add(std::size_t i, const PassLight& light, double direct_weight) {
-  const bool is_first = direct_weight_[i] == 0;
-  const double gathered_share = is_first ? 1 : pass_weight_ / (gathered_weight_ + pass_weight_);
+  const double gathered_share = has_gathered_[i] ? pass_weight_ / (gathered_weight_ + pass_weight_) : 1;
   const double direct_share = direct_weight / (direct_weight_[i] + direct_weight);
   move_mean(gathered_, i, light.gathered, gathered_share);
   move_variance(gathered_variance_, i, light.gathered_variance, gathered_share);
   move_mean(direct_, i, light.direct, direct_share);
   move_variance(direct_variance_, i, light.direct_variance, direct_share);
   direct_weight_[i] += static_cast<float>(direct_weight);
+  has_gathered_[i] = 1;
   if (!reflected_.empty()) move_mean(reflected_, i, light.reflected, gathered_share);
   if (!openness_.empty()) {
     openness_[i] = static_cast<float>(openness_[i] + (light.openness - openness_[i]) * gathered_share);

@@ -47,7 +47,7 @@ class ReplicateSpread {
 ///
 /// Passes are independent of each other. Direct light has weights of its own, by receiver: its number of shadow rays.
 /// What is discrete about the estimate is kept by cell: a square of kCell texels a side, or one group of vertices.
-/// Memory: 7 floats a receiver for variances and weights, 6 for the light itself.
+/// Memory: 7 floats and a byte a receiver for variances and weights, 6 for the light itself.
 class LightEstimate {
  public:
   /// Side of a cell, texels.
@@ -63,7 +63,11 @@ class LightEstimate {
   void begin_pass(double gathered_weight) { pass_weight_ = gathered_weight; }
   void add(std::size_t receiver, const PassLight& light, double direct_weight);
   /// What passes so far found of a receiver does not count.
-  void forget(std::size_t receiver) { direct_weight_[receiver] = 0; }
+  void forget(std::size_t receiver) {
+    direct_weight_[receiver] = 0;
+    has_gathered_[receiver] = 0;
+  }
+  void forget_gathered(std::size_t receiver) { has_gathered_[receiver] = 0; }
   void end_pass() { gathered_weight_ += pass_weight_; }
   /// What passes so far gathered does not count any more.
   void forget_gathered() { gathered_weight_ = 0; }
@@ -81,6 +85,7 @@ class LightEstimate {
   /// the place of its own, and by interpolation. May be negative.
   void add_to_cell(std::size_t cell, double patch_square, double interpolation_square);
   double patch_square(std::size_t cell) const { return patch_square_[cell]; }
+  void forget_interpolation(std::size_t cell) { interpolation_square_[cell] = 0; }
   double interpolation_square(std::size_t cell) const { return interpolation_square_[cell]; }
 
  private:
@@ -93,6 +98,7 @@ class LightEstimate {
   std::vector<float> openness_;                             // [size()], may be empty
   std::vector<float> direct_variance_, gathered_variance_;  // [size() * 3]
   std::vector<float> direct_weight_;                        // [size()]
+  std::vector<std::uint8_t> has_gathered_;                  // [size()] whether `gathered_` counts
   std::vector<float> patch_square_, interpolation_square_;  // [num_cells()]
 };
 

@@ -28,33 +28,20 @@ int whole(double wanted, double least, double multiple) {
   return static_cast<int>(rounded);
 }
 
-}  // namespace
+double squared(double x) { return x * x; }
 
-PassSettings pass_of(const PassScale& scale, double patch_growth) {
-  // Each replicate of a row has enough rays to tell what is buried.
-  constexpr double kLeastRays = 8 * kReplicates;
-  PassSettings pass;
-  pass.rays_per_row = whole(kRaysPerRow * scale.gathered / patch_growth, kLeastRays, kReplicates);
-  pass.patch_light_samples =
-      whole(kPatchLightSamples * scale.gathered / patch_growth, 4 * kReplicates, 4 * kReplicates);
-  pass.rays_per_texel = whole(kRaysPerTexel * scale.gathered, kLeastRays, kReplicates);
-  pass.rays_per_node = whole(kRaysPerNode * scale.gathered, kLeastRays, kReplicates);
-  pass.light_samples = whole(kLightSamples * scale.direct, kReplicates, kReplicates);
-  pass.gathered_weight = scale.gathered;
-  return pass;
+/// What the patches' size and the interpolation that stays are off by.
+double patch_square(const PassResults& results) {
+  return std::max(0.0, squared(results.discretisation) - squared(results.refinable_interpolation));
 }
 
-std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass) {
-  const auto squared = [](double x) { return x * x; };
+/// The next pass, with the patches as they are or half as long a side.
+std::optional<NextPass> plan_pass(const PassResults& results, double max_error, bool refines, NoPass& no_pass) {
   const bool has_budget = results.seconds_left >= 0;
   no_pass.limited_by.clear();
-  if (max_error > 0 && results.error <= kDone * max_error) return std::nullopt;
   const double direct = squared(results.direct_sampling), gathered = squared(results.gathered_sampling);
   // Halved, patches are off by half as much, or less.
-  const double discretisation = squared(results.discretisation);
-  const double leads = max_error > 0 ? squared(kAim * max_error) / 2 : direct + gathered;
-  const bool refines = results.can_refine_patches && discretisation > leads;
-  const double fixed = discretisation / (refines ? 4 : 1) + squared(results.algebraic);
+  const double fixed = patch_square(results) / (refines ? 4 : 1) + squared(results.algebraic);
   if (results.num_passes >= kMostPasses || (direct + gathered == 0 && !refines)) {
     no_pass.limited_by = direct + gathered == 0 ? "discretisation" : "passes";
     return std::nullopt;
@@ -78,7 +65,9 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
 
   // Efforts with the least cost.
   const double direct_cost = results.direct_rays / results.direct_effort;
-  const double gathered_cost = kRayCost * results.gathered_rays / results.gathered_effort;
+  const double past_gathered_cost = kRayCost * results.gathered_rays / results.gathered_effort;
+  const double gathered_cost =
+      past_gathered_cost + kRayCost * kRaysPerTexel * static_cast<double>(results.num_refinable_texels);
   // Where texels share samples out by their deviations s, mean(s)^2 / n is left of n samples each (Neyman 1934). That
   // is known of passes that have done so: the first has not.
   double direct_part = direct * results.direct_effort;
@@ -103,11 +92,11 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
   const double rest = direct_rest * direct_cost + gathered_rest * gathered_cost;
 
   // This pass's share of it.
-  const double spent = results.direct_effort * direct_cost + results.gathered_effort * gathered_cost;
+  const double spent = results.direct_effort * direct_cost + results.gathered_effort * past_gathered_cost;
   double share = std::min(1.0, kGrowth * spent / std::max(rest, 1e-300));
   double seconds_share = 1;
   if (has_budget) {
-    const double last_cost = results.last_direct_scale * direct_cost + results.last_gathered_scale * gathered_cost;
+    const double last_cost = results.last_direct_scale * direct_cost + results.last_gathered_scale * past_gathered_cost;
     const double variable = (results.last_seconds - results.fixed_seconds) / std::max(last_cost, 1e-300);
     const double seconds = variable * share * rest;
     const double most = std::max(0.0, kSafeShare * results.seconds_left - results.fixed_seconds);
@@ -120,16 +109,57 @@ std::optional<NextPass> plan_next_pass(const PassResults& results, double max_er
     seconds_share =
         std::min(1.0, (results.fixed_seconds + variable * share * rest) / std::max(results.seconds_left, 1e-9));
   }
+  // Texels that begin to gather alone have this pass only, and a quarter of a node's rays.
+  double afresh = 0;
+  if (results.num_refinable_texels > 0) {
+    const double part = static_cast<double>(results.num_refinable_texels) / static_cast<double>(results.num_texels);
+    afresh = std::min(kGrowth * results.gathered_effort,
+                      2 * part * (kRaysPerNode / kRaysPerTexel) * gathered_part / allowed);
+  }
   NextPass next;
   // Where the errors say that there is hardly anything left to do and yet it is not done, they have been too low.
   const double least = has_budget ? 0 : kLeastGrowth;
-  next.scale = {std::max({share * gathered_rest, least * gathered_kept, 0.25}),
-                std::max({share * direct_rest, least * results.direct_effort, 0.25}), refines};
+  next.scale = {std::max({share * gathered_rest, least * gathered_kept, afresh, 0.25}),
+                std::max({share * direct_rest, least * results.direct_effort, 0.25}), refines,
+                results.interpolation_limit};
   const double direct_after = direct_part / (results.direct_effort + next.scale.direct);
   const double gathered_after = gathered_part / (gathered_kept + next.scale.gathered);
   next.predicted_error = std::sqrt(direct_after + gathered_after + fixed);
   next.share_of_rest = has_budget ? seconds_share : share;
   return next;
+}
+
+}  // namespace
+
+PassSettings pass_of(const PassScale& scale, double patch_growth) {
+  // Each replicate of a row has enough rays to tell what is buried.
+  constexpr double kLeastRays = 8 * kReplicates;
+  PassSettings pass;
+  pass.rays_per_row = whole(kRaysPerRow * scale.gathered / patch_growth, kLeastRays, kReplicates);
+  pass.patch_light_samples =
+      whole(kPatchLightSamples * scale.gathered / patch_growth, 4 * kReplicates, 4 * kReplicates);
+  pass.rays_per_texel = whole(kRaysPerTexel * scale.gathered, kLeastRays, kReplicates);
+  pass.rays_per_node = whole(kRaysPerNode * scale.gathered, kLeastRays, kReplicates);
+  pass.light_samples = whole(kLightSamples * scale.direct, kReplicates, kReplicates);
+  pass.gathered_weight = scale.gathered;
+  return pass;
+}
+
+std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass) {
+  no_pass.limited_by.clear();
+  if (max_error > 0 && results.error <= kDone * max_error) return std::nullopt;
+  const double leads = max_error > 0 ? squared(kAim * max_error) / 2
+                                     : squared(results.direct_sampling) + squared(results.gathered_sampling);
+  if (!results.can_refine_patches || patch_square(results) <= leads) {
+    return plan_pass(results, max_error, false, no_pass);
+  }
+  const auto refined = plan_pass(results, max_error, true, no_pass);
+  if (results.seconds_left < 0) return refined;
+  const auto kept = plan_pass(results, max_error, false, no_pass);
+  const double without = kept ? kept->predicted_error : results.error;
+  if (!refined || refined->predicted_error >= without) return kept;
+  no_pass.limited_by.clear();
+  return refined;
 }
 
 }  // namespace radbake::radiosity

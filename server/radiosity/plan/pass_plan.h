@@ -23,6 +23,9 @@ struct PassScale {
   double gathered = 1, direct = 1;
   /// Patches half as long a side as before; gathered light starts anew, what earlier passes gathered is dropped.
   bool refines_patches = false;
+  /// Texels that are off by more than this because they are interpolated gather alone from now on, share of the mean
+  /// irradiance; 0: none but those that did.
+  double interpolation_limit = 0;
 
   bool operator==(const PassScale&) const = default;
 };
@@ -40,6 +43,10 @@ struct PassResults {
   double fixed_seconds = 0;  ///< of it, what a pass of any size takes
   double seconds_left = -1;  ///< of a time budget; negative: there is none
   bool can_refine_patches = false;
+  /// Of `discretisation`, what goes where the texels that are off by more than `interpolation_limit` gather alone, and
+  /// how many more do; 0: too few to matter.
+  double refinable_interpolation = 0, interpolation_limit = 0;
+  std::uint64_t num_refinable_texels = 0, num_texels = 0;  ///< of all that count
 };
 
 /// A pass of a scale: 1 is the first pass, the coarsest that tells its own error. `patch_growth`: patches now over
@@ -62,7 +69,8 @@ struct NoPass {
 /// The next pass towards a target, as cheap as the errors so far say: sampling errors fall with the square root of the
 /// effort, and the direct and the gathered part get what buys the most (the least cost c_d N_d + c_g N_g at which
 /// S_d / N_d + S_g / N_g is what the other errors leave of the target). It aims at 0.8 x the target and is done at 0.9.
-/// Where the patches' size leads the error and may be refined, the pass does. Each pass takes at most three times
+/// Where the patches' size leads the error and may be refined, the pass does; within a budget, only where more can be
+/// gathered in the time left than is dropped. Each pass takes at most three times
 /// what all before it took; within a budget, the last one fills what is left. Time decides only how large a pass is and
 /// whether there is one. `no_pass` says why there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
 std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass);

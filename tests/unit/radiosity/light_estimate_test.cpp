@@ -67,5 +67,24 @@ TEST(LightEstimate, KeepsPassesApartThatLeftAReceiverOut) {
   EXPECT_EQ(light.irradiance(0), (Vec3{12, 12, 12}));
 }
 
+// A texel that was interpolated and gathers alone now, and one of which another part counts now.
+TEST(LightEstimate, ForgetsWhatDoesNotCountAnyMore) {
+  LightEstimate light(2, 1, false, false);
+  light.begin_pass(1);
+  for (const std::size_t i : {0, 1}) light.add(i, {{8, 8, 8}, {4, 4, 4}, {16, 16, 16}, {1, 1, 1}, {}, 0}, 4);
+  light.end_pass();
+  light.forget_gathered(0);
+  light.forget(1);
+  EXPECT_EQ(light.irradiance(0), (Vec3{12, 12, 12}));  // until it is known better
+  light.begin_pass(1);
+  for (const std::size_t i : {0, 1}) light.add(i, {{2, 2, 2}, {6, 6, 6}, {8, 8, 8}, {3, 3, 3}, {}, 0}, 4);
+  light.end_pass();
+  EXPECT_EQ(light.gathered(0), (Vec3{6, 6, 6}));
+  EXPECT_EQ(light.gathered_variance(0), (Vec3{3, 3, 3}));
+  EXPECT_EQ(light.direct(0), (Vec3{5, 5, 5}));
+  EXPECT_EQ(light.gathered(1), (Vec3{6, 6, 6}));
+  EXPECT_EQ(light.direct(1), (Vec3{2, 2, 2}));
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

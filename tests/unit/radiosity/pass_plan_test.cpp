@@ -108,6 +108,54 @@ TEST(PassPlan, RefinesPatchesWhereTheirSizeLeads) {
   EXPECT_FALSE(other->scale.refines_patches);
 }
 
+// Smaller patches drop what was gathered from larger ones.
+TEST(PassPlan, KeepsPatchesWhereTheTimeLeftGathersLessThanIsDropped) {
+  PassResults results = after_first_pass();
+  results.gathered_effort = results.direct_effort = 100;
+  results.gathered_rays *= 100;
+  results.direct_rays *= 100;
+  results.gathered_sampling /= 10;
+  results.direct_sampling /= 10;
+  results.discretisation = 0.008;
+  results.error = std::hypot(results.direct_sampling, results.gathered_sampling, results.discretisation);
+  results.last_direct_scale = results.last_gathered_scale = 60;
+  results.last_seconds = 12;
+  results.num_passes = 4;
+  results.can_refine_patches = true;
+  NoPass no_pass;
+  results.seconds_left = 3;
+  const auto last = plan_next_pass(results, 0, no_pass);
+  ASSERT_TRUE(last);
+  EXPECT_FALSE(last->scale.refines_patches);
+  results.seconds_left = 60;
+  const auto next = plan_next_pass(results, 0, no_pass);
+  ASSERT_TRUE(next);
+  EXPECT_TRUE(next->scale.refines_patches);
+}
+
+TEST(PassPlan, StopsInterpolatingWhereThatIsAllThatIsLeft) {
+  PassResults results = after_first_pass();
+  results.gathered_effort = results.direct_effort = 16;
+  results.gathered_rays *= 16;
+  results.direct_rays *= 16;
+  results.direct_sampling = results.gathered_sampling = 0.009;
+  results.discretisation = 0.02;
+  results.error = std::hypot(results.direct_sampling, results.gathered_sampling, results.discretisation);
+  NoPass no_pass;
+  EXPECT_FALSE(plan_next_pass(results, 0.02, no_pass));
+  EXPECT_EQ(no_pass.limited_by, "discretisation");
+  results.refinable_interpolation = 0.019;
+  results.interpolation_limit = 0.008;
+  results.num_texels = 1000;
+  results.num_refinable_texels = 100;
+  const auto next = plan_next_pass(results, 0.02, no_pass);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->scale.interpolation_limit, 0.008);
+  EXPECT_LT(next->predicted_error, 0.8 * 0.02);
+  // Those texels have nothing but this pass.
+  EXPECT_GT(next->scale.gathered, 1);
+}
+
 TEST(PassPlan, FillsABudgetAndNoMore) {
   PassResults results = after_first_pass();
   constexpr double kBudget = 5, kRayCost = 4;

@@ -145,7 +145,7 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   report.error.is_reached = true;
   report.error.limited_by = "time";
   report.error.num_texels = 76;
-  report.passes = {{77, 78, 79, 80, 81, 82, 83, 84, 85.5, 86.5, 87.5, {90.5, 91.5, true}, false, 88.5, 89.5}};
+  report.passes = {{77, 78, 79, 80, 81, 82, 83, 84, 85.5, 86.5, 87.5, {90.5, 91.5, true, 92.5}, false, 88.5, 89.5}};
   report.warnings = {{"bake_warning", "of the bake"}};
   const v1::BakeReport message = to_message(report);
   EXPECT_THAT(unset_fields(message), ::testing::UnorderedElementsAre("plan.prediction", "engine_version", "run"));
@@ -182,6 +182,7 @@ TEST(ResultMessages, SetEveryFieldOfAReportButTheWorkersOwn) {
   EXPECT_EQ(message.passes(0).interval_high(), 87.5);
   EXPECT_EQ(message.passes(0).gathered_scale(), 90.5);
   EXPECT_EQ(message.passes(0).direct_scale(), 91.5);
+  EXPECT_EQ(message.passes(0).interpolation_limit(), 92.5);
   EXPECT_EQ(message.warnings(0).text(), "of the bake");
   // Without a lightmap there are no texels to be wrong.
   report.error = {};

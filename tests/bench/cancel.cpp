@@ -75,7 +75,8 @@ void measure_library(const Scene& scene, const radiosity::BakeOptions& options, 
 Result<void> measure_jobs(const Scene& scene, const options::BakeChoices& choices, const std::string& bin, int runs,
                           double whole_seconds) {
   RADBAKE_ASSIGN_OR_RETURN(const EncodedScene encoded, encode_scene(scene, {}));
-  RADBAKE_ASSIGN_OR_RETURN(const api::PrivateServer server, api::PrivateServer::start({.program = bin + "/radbaked", .costs = {}}));
+  RADBAKE_ASSIGN_OR_RETURN(const api::PrivateServer server,
+                           api::PrivateServer::start({.program = bin + "/radbaked", .costs = {}}));
   RADBAKE_ASSIGN_OR_RETURN(api::Client client, api::Client::connect(server.address()));
   std::vector<api::BlobView> blobs;
   for (const EncodedBlob& blob : encoded.blobs) blobs.push_back({blob.digest, blob.bytes});

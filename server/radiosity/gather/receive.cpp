@@ -19,6 +19,8 @@ constexpr double kRetracedShare = 0.5;
 /// Fixed places that tell whether anything stands across a receiver, and those that its parts are made of: both powers
 /// of 2, so that they are evenly spread.
 constexpr int kFirstLook = 16, kFixedPlaces = 64;
+/// Sites that stand for a part, at least, where it has so many fixed places.
+constexpr std::size_t kFewSites = 8;
 
 /// Sites of one replicate.
 std::size_t sites_each(const GatherScene& scene, const ReceiveScratch& scratch) {
@@ -196,33 +198,38 @@ Reception receive_part(const GatherScene& scene, double share, Seeds seeds, int 
   return out;
 }
 
-/// Of the parts that are large enough to be measured, the darkest one's light. Parts are made of fixed places. One whose
-/// rays nearly all end behind the scenes counts only where all parts' do: how much light finds a way there, and whether
-/// that is enough not to be buried, is a matter of few rays, and no picture shows it.
+/// Of the parts that are large enough to be measured, the darkest one's light. Parts are found by fixed places. One
+/// whose rays nearly all end behind the scenes counts only where all parts' do: how much light finds a way there, and
+/// whether that is enough not to be buried, is a matter of few rays, and no picture shows it.
 Reception receive_darkest_part(const GatherScene& scene, const Receiver& receiver, Seeds seeds, int light_samples,
                                ReceiveScratch& scratch) {
-  const std::size_t num_sites = scratch.sites.size();
   place_fixed(receiver, kFixedPlaces, scratch.places);
   const auto sizes = find_parts(scene.surfaces, scene.visibility, scratch.places, scratch.parting);
   const std::vector<std::uint32_t> part_of = scratch.parting.part;
+  const std::vector<Site> sites = scratch.sites;
+  assign_parts(scene.surfaces, scene.visibility, scratch.places, part_of, sites, scratch.parting);
+  const std::vector<std::uint32_t> part_of_site = scratch.parting.part;
   const auto largest = static_cast<std::uint32_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+  const auto num_replicates = static_cast<std::size_t>(scene.rows.replicates());
   Reception darkest;
   std::uint64_t rays = 0, light_rays = 0;
   double least = std::numeric_limits<double>::infinity();
   constexpr double kNearlyAll = 0.75;
   bool is_any_seen = false;
-  std::vector<Site> own;
   for (std::uint32_t part = 0; part < sizes.size(); ++part) {
     const double share = static_cast<double>(sizes[part]) / static_cast<double>(scratch.places.size());
     if (part != largest && share < kMinVisibleShare) continue;
+    // The part's share of the pass's sites; where they are few, fixed places with them. All count alike.
+    std::vector<Site>& own = scratch.sites;
     own.clear();
-    for (std::size_t k = 0; k < scratch.places.size(); ++k) {
+    for (std::size_t s = 0; s < sites.size(); ++s) {
+      if (part_of_site[s] == part) own.push_back(sites[s]);
+    }
+    for (std::size_t k = 0; k < scratch.places.size() && own.size() < kFewSites; ++k) {
       if (part_of[k] == part) own.push_back(scratch.places[k]);
     }
-    // Which places are which replicate's differs from pass to pass.
-    scratch.sites.clear();
-    for (std::size_t s = 0; s < num_sites; ++s)
-      scratch.sites.push_back(own[(seeds.rays % own.size() + s) % own.size()]);
+    while (own.size() % num_replicates != 0 && own.size() > num_replicates) own.pop_back();
+    for (std::size_t s = 0; own.size() % num_replicates != 0; ++s) own.push_back(Site(own[s]));
     const Reception reception = receive_part(scene, share, seeds, light_samples, scratch);
     rays += reception.rays;
     light_rays += reception.light_rays;

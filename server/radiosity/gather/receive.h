@@ -93,7 +93,7 @@ struct Receiver {
 /// A site does not count where it is buried: inside a single-sided object, or inside a closed object of any kind that
 /// no light enters (the ground under a box that stands on it). Where something thin stands across the receiver, only
 /// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
-/// of a wall, or a mean of both, would be a leak. Its parts are made of places that are the same in every pass: decided
+/// of a wall, or a mean of both, would be a leak. Its parts are those of places that are the same in every pass: found
 /// anew by the sites of each, a part near an eighth would come and go, and no spread of replicates would tell.
 /// `rays_seed`, `light_seed`: what this pass of the receiver is.
 /// `light_samples`: shadow rays to emitters, of all replicates; 0: as many as scene.direct has.

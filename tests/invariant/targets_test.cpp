@@ -81,7 +81,8 @@ TEST(RoomWithALampToTarget, HasTheErrorThatItStates) {
   many.seed = 99;
   many.light_samples = 4096;
   const BakeOutcome reference = baked(scene, many);
-  EXPECT_LE(reference.report.error.relative_rmse, kTarget / 3);
+  // Most of it is what its patches may be off by, which are those of a first pass.
+  EXPECT_LE(reference.report.error.relative_rmse, 0.4 * kTarget);
   // The same texels in the same order.
   std::vector<double> expected;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
 #include <ctime>
 #include <map>
+#include <mutex>
+#include <stop_token>
 #include <thread>
 #include <utility>
 
@@ -18,6 +21,7 @@ namespace {
 /// Equal bakes of one setting: as many as fit in this time, from one to the most.
 constexpr double kTimedSeconds = 2;
 constexpr int kMaxTimedRuns = 3;
+constexpr double kNoLimitSeconds = 1e6;
 
 /// The middle of the ranges, which one axis at a time leaves.
 constexpr int kMiddleRays = 256, kMiddleSpacing = 4, kMiddleLightSamples = 64;
@@ -109,19 +113,47 @@ struct MeasuredBake {
   double cpu_seconds = 0, seconds = 0;
 };
 
-Result<MeasuredBake> bake_once(const Scene& scene, const radiosity::BakeOptions& options) {
+/// Requests a stop when the time is up, unless it goes away before.
+class TimeLimit {
+ public:
+  explicit TimeLimit(double seconds)
+      : thread_([this, seconds](const std::stop_token& done) {
+          std::unique_lock lock(mutex_);
+          wake_.wait_for(lock, done, std::chrono::duration<double>(seconds), [] { return false; });
+          if (!done.stop_requested()) bake_.request_stop();
+        }) {}
+
+  std::stop_token token() const { return bake_.get_token(); }
+  bool is_over() const { return bake_.stop_requested(); }
+
+ private:
+  std::stop_source bake_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::jthread thread_;  // last: it uses the others
+};
+
+Result<MeasuredBake> bake_once(const Scene& scene, const radiosity::BakeOptions& options,
+                               double limit_seconds = kNoLimitSeconds) {
   using Clock = std::chrono::steady_clock;
   PassRecorder recorder;
   const auto start = Clock::now();
   const double cpu = cpu_seconds();
-  RADBAKE_ASSIGN_OR_RETURN(radiosity::BakeOutcome outcome, radiosity::bake_scene(scene, options, recorder));
+  const TimeLimit limit(limit_seconds);
+  auto baked = radiosity::bake_scene(scene, options, recorder, limit.token());
+  if (!baked.ok() && limit.is_over()) {
+    char text[60];
+    std::snprintf(text, sizeof text, "it took more than %g s", limit_seconds);
+    return Error{ErrorCode::kCancelled, text};
+  }
+  RADBAKE_ASSIGN_OR_RETURN(radiosity::BakeOutcome outcome, std::move(baked));
   return MeasuredBake{std::move(outcome), recorder.maps(), cpu_seconds() - cpu,
                       std::chrono::duration<double>(Clock::now() - start).count()};
 }
 
 /// Bakes again and again, to equal maps, and keeps the cheapest.
-Result<MeasuredBake> bake_cheapest(const Scene& scene, const radiosity::BakeOptions& options) {
-  RADBAKE_ASSIGN_OR_RETURN(MeasuredBake cheapest, bake_once(scene, options));
+Result<MeasuredBake> bake_cheapest(const Scene& scene, const radiosity::BakeOptions& options, double limit_seconds) {
+  RADBAKE_ASSIGN_OR_RETURN(MeasuredBake cheapest, bake_once(scene, options, limit_seconds));
   double total = cheapest.seconds;
   for (int run = 1; run < kMaxTimedRuns && total < kTimedSeconds; ++run) {
     RADBAKE_ASSIGN_OR_RETURN(MeasuredBake again, bake_once(scene, options));
@@ -299,7 +331,8 @@ Result<AccuracyStudy> study_accuracy(const Scene& scene, const AccuracySweep& sw
                            AccuracyRun label) -> Result<void> {
     on_bake(done++, total, what);
     // What fits into a budget is not the same again.
-    const auto bake = label.budget > 0 ? bake_once(scene, options) : bake_cheapest(scene, options);
+    const auto bake =
+        label.budget > 0 ? bake_once(scene, options) : bake_cheapest(scene, options, sweep.bake_limit_seconds);
     if (!bake.ok()) {
       study.left_out.push_back(what + ": " + bake.error().message);
       return {};

@@ -40,8 +40,9 @@ struct FixedSetting {
 struct AccuracySweep {
   radiosity::BakeOptions base;  ///< of progressive bakes
   std::vector<FixedSetting> settings;
-  std::vector<double> targets;  ///< of progressive bakes, as fractions
-  std::vector<double> budgets;  ///< of others, wall seconds
+  std::vector<double> targets;      ///< of progressive bakes, as fractions
+  std::vector<double> budgets;      ///< of others, wall seconds
+  double bake_limit_seconds = 120;  ///< what takes longer is left out
 };
 
 /// Some forty settings about the middle of each range, and progressive bakes: to 10, 5, 2 and 1 %, for 1, 5 and 20 s.

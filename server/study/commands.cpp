@@ -152,7 +152,8 @@ ExitCode run_accuracy(const AccuracyChoices& choices) {
   // Before the minutes that follow.
   const std::string& folder = choices.scene.folder;
   if (const auto made = make_folder(folder); !made.ok()) return fail(made.error(), kNotWritten);
-  const AccuracySweep sweep = default_sweep(bake_options(choices.scene));
+  AccuracySweep sweep = default_sweep(bake_options(choices.scene));
+  if (choices.bake_limit_seconds > 0) sweep.bake_limit_seconds = choices.bake_limit_seconds;
   auto reference = find_reference(choices, *scene, sweep.base);
   if (!reference.ok()) {
     return fail(reference.error(), reference.error().code == ErrorCode::kInvalidArgument ? kBadInput : kFailed);

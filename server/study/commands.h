@@ -39,8 +39,9 @@ struct AccuracyChoices {
   SceneChoices scene;
   std::string reference;  ///< EXR; empty: baked
   double reference_scale = 1;
-  double reference_error = 0;  ///< relative RMSE of the file
-  int reference_rays = 0;      ///< of the baked one; 0: as ReferenceEffort has it
+  double reference_error = 0;     ///< relative RMSE of the file
+  int reference_rays = 0;         ///< of the baked one; 0: as ReferenceEffort has it
+  double bake_limit_seconds = 0;  ///< of a fixed setting; 0: as AccuracySweep has it
 };
 
 /// Each runs a command, prints its table on stdout and its errors on stderr.

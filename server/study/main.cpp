@@ -111,6 +111,10 @@ CLI::App* add_accuracy(CLI::App& app, AccuracyChoices& choices) {
       ->check(CLI::Range(64, 65536))
       ->excludes(reference)
       ->type_name("N");
+  sub->add_option("--bake-limit", choices.bake_limit_seconds,
+                  "Seconds that a fixed setting may take: what takes longer is left out; default: 120")
+      ->check(check_positive, "")
+      ->type_name("SECONDS");
   radbake::options::add_bake_options(*sub, choices.scene.bake);
   sub->footer(
       "\nRays, patches, light samples, spacing, form factors, solvers and targets are what is swept: options that set "

@@ -49,9 +49,11 @@ std::optional<NextPass> plan_pass(const PassResults& results, double max_error, 
 
   // What sampling may leave. Where the other parts take all, it is brought to half of them: less would be hard to see.
   double allowed = 0;
+  bool can_reach_target = false;
   if (max_error > 0) {
     allowed = squared(kAim * max_error) - fixed;
     const double floor = fixed / 4;
+    can_reach_target = allowed >= floor;
     if (allowed < floor) {
       if (!refines && direct + gathered <= 2 * floor) {
         no_pass.limited_by = "discretisation";
@@ -89,7 +91,13 @@ std::optional<NextPass> plan_pass(const PassResults& results, double max_error, 
   }
   const double direct_rest = std::max(0.0, direct_effort - results.direct_effort);
   const double gathered_rest = std::max(0.0, gathered_effort - gathered_kept);
-  const double rest = direct_rest * direct_cost + gathered_rest * gathered_cost;
+  // Texels that begin to gather alone have this pass only, and a quarter of a node's rays.
+  double afresh = 0;
+  if (results.num_refinable_texels > 0) {
+    const double part = static_cast<double>(results.num_refinable_texels) / static_cast<double>(results.num_texels);
+    afresh = 2 * part * (kRaysPerNode / kRaysPerTexel) * gathered_part / allowed;
+  }
+  const double rest = direct_rest * direct_cost + std::max(gathered_rest, afresh) * gathered_cost;
 
   // This pass's share of it.
   const double spent = results.direct_effort * direct_cost + results.gathered_effort * past_gathered_cost;
@@ -109,16 +117,10 @@ std::optional<NextPass> plan_pass(const PassResults& results, double max_error, 
     seconds_share =
         std::min(1.0, (results.fixed_seconds + variable * share * rest) / std::max(results.seconds_left, 1e-9));
   }
-  // Texels that begin to gather alone have this pass only, and a quarter of a node's rays.
-  double afresh = 0;
-  if (results.num_refinable_texels > 0) {
-    const double part = static_cast<double>(results.num_refinable_texels) / static_cast<double>(results.num_texels);
-    afresh = std::min(kGrowth * results.gathered_effort,
-                      2 * part * (kRaysPerNode / kRaysPerTexel) * gathered_part / allowed);
-  }
   NextPass next;
   // Where the errors say that there is hardly anything left to do and yet it is not done, they have been too low.
   const double least = has_budget ? 0 : kLeastGrowth;
+  afresh = std::min(afresh, kGrowth * results.gathered_effort);
   next.scale = {std::max({share * gathered_rest, least * gathered_kept, afresh, 0.25}),
                 std::max({share * direct_rest, least * results.direct_effort, 0.25}), refines,
                 results.interpolation_limit};
@@ -126,7 +128,21 @@ std::optional<NextPass> plan_pass(const PassResults& results, double max_error, 
   const double gathered_after = gathered_part / (gathered_kept + next.scale.gathered);
   next.predicted_error = std::sqrt(direct_after + gathered_after + fixed);
   next.share_of_rest = has_budget ? seconds_share : share;
+  next.rest = rest;
+  next.fixed_error = std::sqrt(fixed);
+  next.can_reach_target = can_reach_target;
   return next;
+}
+
+/// Whether to do more than gather more rays in the same way. Within a budget, errors after the pass are compared:
+/// smaller patches drop what was gathered. Towards a target it is the work left, where both ways lead there.
+bool is_worth_it(const NextPass& plan, const std::optional<NextPass>& than, double error, bool has_budget) {
+  constexpr double kLessError = 0.9;
+  // Rows of more patches and texels that gather alone take longer, and what they gain is known to a factor.
+  constexpr double kLessWork = 1 / 1.5;
+  if (has_budget) return plan.predicted_error < (than ? kLessError * than->predicted_error : error);
+  if (!than || plan.can_reach_target != than->can_reach_target) return !than || plan.can_reach_target;
+  return plan.can_reach_target ? plan.rest < kLessWork * than->rest : plan.fixed_error < kLessError * than->fixed_error;
 }
 
 }  // namespace
@@ -148,18 +164,26 @@ PassSettings pass_of(const PassScale& scale, double patch_growth) {
 std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass) {
   no_pass.limited_by.clear();
   if (max_error > 0 && results.error <= kDone * max_error) return std::nullopt;
+  PassResults interpolated = results;
+  interpolated.refinable_interpolation = interpolated.interpolation_limit = 0;
+  interpolated.num_refinable_texels = 0;
+  auto best = plan_pass(interpolated, max_error, false, no_pass);
+
+  // What else could be done, in the order of what it costs: each has to be worth it.
   const double leads = max_error > 0 ? squared(kAim * max_error) / 2
                                      : squared(results.direct_sampling) + squared(results.gathered_sampling);
-  if (!results.can_refine_patches || patch_square(results) <= leads) {
-    return plan_pass(results, max_error, false, no_pass);
-  }
-  const auto refined = plan_pass(results, max_error, true, no_pass);
-  if (results.seconds_left < 0) return refined;
-  const auto kept = plan_pass(results, max_error, false, no_pass);
-  const double without = kept ? kept->predicted_error : results.error;
-  if (!refined || refined->predicted_error >= without) return kept;
-  no_pass.limited_by.clear();
-  return refined;
+  const bool has_budget = results.seconds_left >= 0;
+  const auto consider = [&](const PassResults& own, bool refines) {
+    NoPass unused;
+    const auto plan = plan_pass(own, max_error, refines, unused);
+    if (plan && is_worth_it(*plan, best, results.error, has_budget)) best = plan;
+  };
+  const bool can_refine = results.can_refine_patches;
+  if (results.num_refinable_texels > 0) consider(results, false);
+  if (can_refine && patch_square(interpolated) > leads) consider(interpolated, true);
+  if (can_refine && results.num_refinable_texels > 0 && patch_square(results) > leads) consider(results, true);
+  if (best) no_pass.limited_by.clear();
+  return best;
 }
 
 }  // namespace radbake::radiosity

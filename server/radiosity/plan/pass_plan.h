@@ -59,6 +59,9 @@ struct NextPass {
   double predicted_error = 0;
   /// Of the work that is left to reach the target (or to fill the budget), this pass's share.
   double share_of_rest = 1;
+  double rest = 0;                ///< that work, in shadow rays
+  bool can_reach_target = false;  ///< the patches' size and interpolation leave room for sampling
+  double fixed_error = 0;         ///< what no number of rays goes below
 };
 
 /// Why there is no other pass. Empty: what was asked holds.
@@ -69,10 +72,11 @@ struct NoPass {
 /// The next pass towards a target, as cheap as the errors so far say: sampling errors fall with the square root of the
 /// effort, and the direct and the gathered part get what buys the most (the least cost c_d N_d + c_g N_g at which
 /// S_d / N_d + S_g / N_g is what the other errors leave of the target). It aims at 0.8 x the target and is done at 0.9.
-/// Where the patches' size leads the error and may be refined, the pass does; within a budget, only where more can be
-/// gathered in the time left than is dropped. Each pass takes at most three times
-/// what all before it took; within a budget, the last one fills what is left. Time decides only how large a pass is and
-/// whether there is one. `no_pass` says why there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
+/// Where the patches' size leads the error, or interpolation, the pass has patches half as long, or more texels that
+/// gather alone: towards a target where it takes fewer rays by far then or is not reached else, within a budget where
+/// more can be gathered in the time left than is dropped. Each pass takes at most three times what all before it took;
+/// within a budget, the last one fills what is left. Time decides only how large a pass is and whether there is one.
+/// `no_pass` says why there is none. Preconditions: max_error > 0 or results.seconds_left >= 0.
 std::optional<NextPass> plan_next_pass(const PassResults& results, double max_error, NoPass& no_pass);
 
 }  // namespace radbake::radiosity

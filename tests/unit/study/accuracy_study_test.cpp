@@ -206,6 +206,19 @@ TEST(AccuracyStudy, LeavesOutWhatABakeRefusesAndFailsWhereThatIsAll) {
   EXPECT_THAT(refused.error().message, HasSubstr("no setting could be baked"));
 }
 
+TEST(AccuracyStudy, LeavesOutWhatTakesTooLong) {
+  const Scene scene = tests::small_emitter_room(0.5);
+  AccuracySweep sweep = small_sweep({4096});
+  sweep.budgets = {0.2};
+  const AccuracyReference reference = make_reference(scene, sweep.base, {64, 64, kPatches}).value();
+  sweep.bake_limit_seconds = 1e-3;
+  const AccuracyStudy study =
+      study_accuracy(scene, sweep, reference, [](std::size_t, std::size_t, const std::string&) {}).value();
+  EXPECT_EQ(study.runs.size(), 1U);
+  ASSERT_EQ(study.left_out.size(), 1U);
+  EXPECT_THAT(study.left_out[0], HasSubstr("it took more than 0.001 s"));
+}
+
 TEST(AccuracyStudy, RefusesAReferenceOfAnotherSize) {
   const Scene scene = tests::small_emitter_room(0.5);
   AccuracyReference reference;

@@ -112,7 +112,9 @@ class Bake {
   void look_for_interpolation(const LightError& error) {
     // Second differences of nodes tell it once their noise is not far above what is asked.
     constexpr double kShare = 0.4, kNoise = 1.25, kWorth = 0.05;
-    const double aim = options_.max_error > 0 ? options_.max_error : error.relative_rmse;
+    // Where more is off by the patches and by interpolation than is asked, the worst of that goes first.
+    const double aim =
+        options_.max_error > 0 ? std::max(options_.max_error, error.discretisation) : error.relative_rmse;
     const double limit = kShare * aim;
     results_.refinable_interpolation = results_.interpolation_limit = 0;
     results_.num_refinable_texels = 0;

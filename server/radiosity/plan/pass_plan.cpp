@@ -20,6 +20,8 @@ constexpr double kGrowth = 3;
 constexpr int kMostPasses = 64;
 /// Of the time left, what a pass may be predicted to take.
 constexpr double kSafeShare = 0.9;
+/// What a ray of a later pass takes, over one of the first.
+constexpr double kLaterSeconds = 0.7;
 /// A pass that adds less than this share to what was spent is not worth its fixed costs.
 constexpr double kLeastGrowth = 0.1;
 
@@ -105,7 +107,9 @@ std::optional<NextPass> plan_pass(const PassResults& results, double max_error, 
   double seconds_share = 1;
   if (has_budget) {
     const double last_cost = results.last_direct_scale * direct_cost + results.last_gathered_scale * past_gathered_cost;
-    const double variable = (results.last_seconds - results.fixed_seconds) / std::max(last_cost, 1e-300);
+    // The first pass takes longer by the ray: it is small, and finds all memory cold.
+    const double later = results.num_passes == 1 ? kLaterSeconds : 1;
+    const double variable = later * (results.last_seconds - results.fixed_seconds) / std::max(last_cost, 1e-300);
     const double seconds = variable * share * rest;
     const double most = std::max(0.0, kSafeShare * results.seconds_left - results.fixed_seconds);
     if (seconds > most) share *= most / seconds;
@@ -137,7 +141,7 @@ std::optional<NextPass> plan_pass(const PassResults& results, double max_error, 
 /// Whether to do more than gather more rays in the same way. Within a budget, errors after the pass are compared:
 /// smaller patches drop what was gathered. Towards a target it is the work left, where both ways lead there.
 bool is_worth_it(const NextPass& plan, const std::optional<NextPass>& than, double error, bool has_budget) {
-  constexpr double kLessError = 0.9;
+  constexpr double kLessError = 0.7;
   // Rows of more patches and texels that gather alone take longer, and what they gain is known to a factor.
   constexpr double kLessWork = 1 / 1.5;
   if (has_budget) return plan.predicted_error < (than ? kLessError * than->predicted_error : error);

@@ -34,6 +34,22 @@ Error failure(const std::string& what) {
 
 }  // namespace
 
+Result<void> announce(int socket) {
+  constexpr char kWaiting = 'w';
+  if (::send(socket, &kWaiting, 1, MSG_NOSIGNAL) == 1) return {};
+  return failure("cannot tell the server that the worker waits");
+}
+
+bool is_announced(int socket, std::chrono::milliseconds limit) {
+  pollfd wanted{socket, POLLIN, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&wanted, 1, static_cast<int>(limit.count()));
+  } while (ready < 0 && errno == EINTR);
+  char said = 0;
+  return ready == 1 && ::recv(socket, &said, 1, MSG_DONTWAIT) == 1;
+}
+
 bool fits(const Assignment& assignment) {
   return assignment.inputs.size() <= kMaxInputs && assignment.job.size() <= kMaxJobBytes;
 }

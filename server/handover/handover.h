@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -21,6 +22,13 @@ inline constexpr std::size_t kMaxInputs = 200;
 inline constexpr std::size_t kMaxJobBytes = 100;
 /// Whether one message holds it.
 bool fits(const Assignment& assignment);
+
+/// What a worker says once it waits. Errors: kUnavailable when nobody is there.
+Result<void> announce(int socket);
+
+/// Whether the worker at the other end waits, or does so before the time is up: false at once where it is gone. Takes
+/// what it said off the socket; ask once.
+bool is_announced(int socket, std::chrono::milliseconds limit);
 
 /// Sends an assignment over a connected Unix socket, before anything else; the descriptors stay open here.
 /// Precondition: fits(). Errors: kUnavailable when nobody is there.

@@ -3,6 +3,7 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <chrono>
 #include <utility>
 
 namespace radbake::jobs {
@@ -32,7 +33,12 @@ Result<std::unique_ptr<ReadyWorker>> ReadyWorker::start(const WorkerOptions& opt
 
 std::optional<ReadyWorker::Hired> ReadyWorker::hire(const handover::Assignment& assignment,
                                                     std::function<void(const WorkerExit&)> on_exit) {
-  if (!handover::fits(assignment) || !handover::give(socket_.get(), assignment).ok()) return std::nullopt;
+  // One that is gone, or does not get so far, is no loss: another is started. To wait for it costs less than that.
+  constexpr std::chrono::milliseconds kPatience{200};
+  if (!handover::fits(assignment) || !handover::is_announced(socket_.get(), kPatience) ||
+      !handover::give(socket_.get(), assignment).ok()) {
+    return std::nullopt;
+  }
   {
     const std::lock_guard lock(ending_->mutex);
     if (ending_->has_ended) return std::nullopt;

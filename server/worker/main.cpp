@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
   grpc_init();
   double waited_seconds = 0;
   if (waits) {
+    if (!handover::announce(fd).ok()) return worker::kExitServerGone;
     auto handed = handover::take(fd);
     if (!handed.ok()) return worker::kExitServerGone;
     waited_seconds = worker::seconds_since_process_start();

@@ -247,6 +247,7 @@ int main(int argc, char** argv) {
   std::vector<int> handed;
   if (std::strcmp(argv[argc - 1], "--wait") == 0) {
     if (program == kDeadWhileReadyName) return 1;
+    if (!radbake::handover::announce(fd).ok()) return 3;
     auto assignment = radbake::handover::take(fd);
     if (!assignment.ok()) return 3;
     job = assignment->job;

@@ -39,6 +39,21 @@ class HandoverTest : public ::testing::Test {
   std::vector<int> files_;
 };
 
+TEST_F(HandoverTest, TellsAWorkerThatWaitsFromOneThatIsGone) {
+  using std::chrono::milliseconds;
+  constexpr milliseconds kShort{10}, kLong{3'600'000};
+  EXPECT_FALSE(is_announced(ends_[0], kShort));
+  ASSERT_TRUE(announce(ends_[1]).ok());
+  EXPECT_TRUE(is_announced(ends_[0], kLong));
+  // What it said is off the socket: the handover follows.
+  ASSERT_TRUE(give(ends_[0], {"bakes/1", 1, {}}).ok());
+  EXPECT_EQ(take(ends_[1]).value().job, "bakes/1");
+  ::close(ends_[1]);
+  ends_[1] = -1;
+  EXPECT_FALSE(is_announced(ends_[0], kLong));
+  EXPECT_FALSE(announce(ends_[0]).ok());
+}
+
 TEST_F(HandoverTest, PassesNameAndInputsAndLeavesWhatFollows) {
   const Assignment given{"bakes/0123456789abcdef", 3, {file_of("manifest"), file_of("mesh")}};
   ASSERT_TRUE(give(ends_[0], given).ok());

@@ -14,8 +14,6 @@ constexpr int kReplicates = 4;
 
 double squared(double x) { return x * x; }
 
-bool does_count(const TexelFacts& facts) { return facts.state == TexelState::kValid && !facts.is_emitter; }
-
 /// Means over the 3 x 3 neighbours that are valid, `rounds` times: a chart keeps to itself, since charts stand apart.
 /// Shapes: values [rows * width * channels].
 void pool(const std::vector<TexelFacts>& facts, std::size_t width, int channels, int rounds,
@@ -118,7 +116,7 @@ LightError estimate_error(const LightEstimate& estimate, const std::function<boo
 LightError estimate_error(const LightmapGather& gather, double algebraic_bound) {
   const std::vector<TexelFacts>& facts = gather.facts();
   return estimate_error(
-      gather.estimate(), [&](std::size_t i) { return does_count(facts[i]); },
+      gather.estimate(), [&](std::size_t i) { return facts[i].counts(); },
       [&](std::size_t i) { return gather.cell_of(i); }, algebraic_bound, gather.relative_spread());
 }
 
@@ -150,7 +148,7 @@ std::vector<float> standard_errors(const LightmapGather& gather) {
                             squared(kRounding * irradiance[c]);
       out[4 * i + static_cast<std::size_t>(c)] = static_cast<float>(std::sqrt(square));
     }
-    out[4 * i + 3] = does_count(facts[i]) ? facts[i].coverage : 0.0f;
+    out[4 * i + 3] = facts[i].counts() ? facts[i].coverage : 0.0f;
   }
   return out;
 }
@@ -162,7 +160,7 @@ WorstPlace find_worst(const LightmapGather& gather, const std::vector<float>& er
   };
   std::vector<float> squares;
   for (std::size_t i = 0; i < facts.size(); ++i) {
-    if (does_count(facts[i])) squares.push_back(static_cast<float>(square_of(i)));
+    if (facts[i].counts()) squares.push_back(static_cast<float>(square_of(i)));
   }
   WorstPlace worst;
   if (squares.empty() || !(mean_irradiance > 0)) return worst;
@@ -179,7 +177,7 @@ WorstPlace find_worst(const LightmapGather& gather, const std::vector<float>& er
   double sum = 0;
   std::size_t num = 0;
   for (std::size_t i = 0; i < facts.size(); ++i) {
-    if (!does_count(facts[i]) || static_cast<float>(square_of(i)) < least) continue;
+    if (!facts[i].counts() || static_cast<float>(square_of(i)) < least) continue;
     sum += square_of(i);
     sums[part_of(i)] += square_of(i);
     ++num;
@@ -188,7 +186,7 @@ WorstPlace find_worst(const LightmapGather& gather, const std::vector<float>& er
   const auto part = static_cast<std::size_t>(std::max_element(sums.begin(), sums.end()) - sums.begin());
   double largest = -1;
   for (std::size_t i = 0; i < facts.size(); ++i) {
-    if (!does_count(facts[i]) || part_of(i) != part || square_of(i) <= largest) continue;
+    if (!facts[i].counts() || part_of(i) != part || square_of(i) <= largest) continue;
     largest = square_of(i);
     worst.texel = i;
   }

@@ -32,7 +32,7 @@ struct LightError {
 
 /// Of what patches twice as large would change, the share that those of the size at hand are off by: 1/3 where errors
 /// go with the square of the size, 1 where they go with the size. Strips of one patch across cannot be told twice as
-/// large: measured in a hall with deep windows (`tests/bench/make_interior.py --small`), the share is 0.9.
+/// large: measured in a hall with deep windows (`tests/scenes/make_interior.py --small`), the share is 0.9.
 inline constexpr double kPatchShare = 0.75;
 
 /// `counts`: whether a receiver does. `algebraic_bound`: lx.

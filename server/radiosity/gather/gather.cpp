@@ -216,27 +216,19 @@ bool LightmapGather::gather_nodes(const GatherPass& pass, std::stop_token stop, 
 }
 
 void LightmapGather::judge_squares(const std::vector<NodeLight>& nodes) {
-  const int across = roles_.nodes_across();
-  if (across == 0) return;
-  const int down = static_cast<int>(roles_.num_nodes() / static_cast<std::size_t>(across));
-  for (int j = 0; j + 1 < down; ++j) {
-    for (int i = 0; i + 1 < across; ++i) {
-      if (!roles_.is_plain(i, j)) continue;
-      const std::size_t first =
-          static_cast<std::size_t>(j) * static_cast<std::size_t>(across) + static_cast<std::size_t>(i);
-      const auto below = static_cast<std::size_t>(across);
-      double nearest = std::numeric_limits<double>::infinity();
-      bool see_light = true;
-      for (const std::size_t node : {first, first + 1, first + below, first + below + 1}) {
-        nearest = std::min<double>(nearest, nodes[node].nearest);
-        see_light = see_light && nodes[node].sees_light;
-      }
-      // The side of the square, from the texels' area.
-      const std::size_t texel = static_cast<std::size_t>(j * roles_.spacing()) * atlas_.width() + i * roles_.spacing();
-      const double side = roles_.spacing() * std::sqrt(facts_[texel].area);
-      if (!see_light || nearest < kNear * side) roles_.refuse(i, j);
+  const auto below = static_cast<std::size_t>(roles_.nodes_across());
+  roles_.for_each_plain_square([&](int i, int j) {
+    const std::size_t first = static_cast<std::size_t>(j) * below + static_cast<std::size_t>(i);
+    double nearest = std::numeric_limits<double>::infinity();
+    bool see_light = true;
+    for (const std::size_t node : {first, first + 1, first + below, first + below + 1}) {
+      nearest = std::min<double>(nearest, nodes[node].nearest);
+      see_light = see_light && nodes[node].sees_light;
     }
-  }
+    // The side of the square, from the texels' area.
+    const double side = roles_.spacing() * std::sqrt(facts_[texel_of_node(i, j)].area);
+    if (!see_light || nearest < kNear * side) roles_.refuse(i, j);
+  });
 }
 
 double LightmapGather::interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const {
@@ -270,71 +262,6 @@ double LightmapGather::interpolation_square(const std::vector<NodeLight>& nodes,
   }
   // Both directions: twice the mean of what was found of them.
   return num > 0 ? 2 * kShare * sum / num : 0;
-}
-
-std::size_t LightmapGather::cell_of_square(int i, int j) const {
-  return cell_of(static_cast<std::size_t>(j * roles_.spacing()) * static_cast<std::size_t>(atlas_.width()) +
-                 static_cast<std::size_t>(i * roles_.spacing()));
-}
-
-template <typename OnSquare>
-void LightmapGather::for_each_square_above(double limit, const OnSquare& on_square) const {
-  const int across = roles_.nodes_across();
-  if (across == 0) return;
-  const int down = static_cast<int>(roles_.num_nodes() / static_cast<std::size_t>(across));
-  for (int j = 0; j + 1 < down; ++j) {
-    for (int i = 0; i + 1 < across; ++i) {
-      if (!roles_.is_plain(i, j)) continue;
-      // One square's second differences tell little: those beside it are like it.
-      double sum = 0;
-      int num = 0;
-      for (int b = std::max(j - 1, 0); b <= std::min(j + 1, down - 1); ++b) {
-        for (int a = std::max(i - 1, 0); a <= std::min(i + 1, across - 1); ++a) {
-          if (!roles_.is_plain(a, b)) continue;
-          sum += estimate_.interpolation_square(cell_of_square(a, b));
-          ++num;
-        }
-      }
-      if (sum > limit * limit * num) on_square(i, j);
-    }
-  }
-}
-
-LightmapGather::Interpolation LightmapGather::interpolation_above(double limit) const {
-  Interpolation out;
-  const int spacing = roles_.spacing();
-  for_each_square_above(limit, [&](int i, int j) {
-    std::uint64_t num = 0;
-    for (int y = j * spacing; y < (j + 1) * spacing; ++y) {
-      for (int x = i * spacing; x < (i + 1) * spacing; ++x) {
-        const TexelFacts& facts = facts_[static_cast<std::size_t>(y) * static_cast<std::size_t>(atlas_.width()) +
-                                         static_cast<std::size_t>(x)];
-        num += facts.state == TexelState::kValid && !facts.is_emitter;
-      }
-    }
-    out.squares += static_cast<double>(num) * estimate_.interpolation_square(cell_of_square(i, j));
-    out.num_texels += num;
-  });
-  return out;
-}
-
-void LightmapGather::stop_interpolating_above(double limit) {
-  std::vector<std::pair<int, int>> squares;
-  for_each_square_above(limit, [&](int i, int j) { squares.emplace_back(i, j); });
-  const int spacing = roles_.spacing();
-  for (const auto& [i, j] : squares) {
-    roles_.refuse(i, j);
-    estimate_.forget_interpolation(cell_of_square(i, j));
-    // Texels at its border, too, as others may be interpolated in the square beside it: but not nodes.
-    for (int dy = 0; dy <= spacing; ++dy) {
-      for (int dx = 0; dx <= spacing; ++dx) {
-        if (dx % spacing == 0 && dy % spacing == 0) continue;
-        estimate_.forget_gathered(static_cast<std::size_t>(j * spacing + dy) *
-                                      static_cast<std::size_t>(atlas_.width()) +
-                                  static_cast<std::size_t>(i * spacing + dx));
-      }
-    }
-  }
 }
 
 void LightmapGather::gather_between(const GatherPass& pass, const std::vector<NodeLight>& nodes,

@@ -29,6 +29,9 @@ struct TexelFacts {
   Receiver::Parts parts = Receiver::Parts::kUnknown;
   float coverage = 0;
   float area = 0;  ///< of its footprint, scene units squared
+
+  /// Whether what it is off by counts.
+  bool counts() const { return state == TexelState::kValid && !is_emitter; }
 };
 
 /// One pass of the final gather.
@@ -107,7 +110,11 @@ class LightmapGather {
                     std::vector<NodeLight>& nodes, GatherCounts& counts);
   void judge_squares(const std::vector<NodeLight>& nodes);
   double interpolation_square(const std::vector<NodeLight>& nodes, int i, int j) const;
-  std::size_t cell_of_square(int i, int j) const;
+  /// The texel of a node, or one beside it.
+  std::size_t texel_of_node(int i, int j, int dx = 0, int dy = 0) const {
+    return static_cast<std::size_t>(j * roles_.spacing() + dy) * static_cast<std::size_t>(atlas_.width()) +
+           static_cast<std::size_t>(i * roles_.spacing() + dx);
+  }
   /// Calls back with (i, j) of each plain square that is off by more than the limit.
   template <typename OnSquare>
   void for_each_square_above(double limit, const OnSquare& on_square) const;

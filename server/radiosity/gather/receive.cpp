@@ -198,6 +198,23 @@ Reception receive_part(const GatherScene& scene, double share, Seeds seeds, int 
   return out;
 }
 
+/// Makes scratch.sites those of a part: its share of the pass's sites, where they are few, fixed places with them. All
+/// count alike, and each replicate has as many. Shapes: sites, part_of_site [s]; scratch.places, part_of_place [p].
+void place_sites_of_part(std::uint32_t part, std::span<const Site> sites, std::span<const std::uint32_t> part_of_site,
+                         std::span<const std::uint32_t> part_of_place, std::size_t num_replicates,
+                         ReceiveScratch& scratch) {
+  std::vector<Site>& own = scratch.sites;
+  own.clear();
+  for (std::size_t s = 0; s < sites.size(); ++s) {
+    if (part_of_site[s] == part) own.push_back(sites[s]);
+  }
+  for (std::size_t k = 0; k < scratch.places.size() && own.size() < kFewSites; ++k) {
+    if (part_of_place[k] == part) own.push_back(scratch.places[k]);
+  }
+  while (own.size() % num_replicates != 0 && own.size() > num_replicates) own.pop_back();
+  for (std::size_t s = 0; own.size() % num_replicates != 0; ++s) own.push_back(Site(own[s]));
+}
+
 /// Of the parts that are large enough to be measured, the darkest one's light. Parts are found by fixed places. One
 /// whose rays nearly all end behind the scenes counts only where all parts' do: how much light finds a way there, and
 /// whether that is enough not to be buried, is a matter of few rays, and no picture shows it.
@@ -219,17 +236,7 @@ Reception receive_darkest_part(const GatherScene& scene, const Receiver& receive
   for (std::uint32_t part = 0; part < sizes.size(); ++part) {
     const double share = static_cast<double>(sizes[part]) / static_cast<double>(scratch.places.size());
     if (part != largest && share < kMinVisibleShare) continue;
-    // The part's share of the pass's sites; where they are few, fixed places with them. All count alike.
-    std::vector<Site>& own = scratch.sites;
-    own.clear();
-    for (std::size_t s = 0; s < sites.size(); ++s) {
-      if (part_of_site[s] == part) own.push_back(sites[s]);
-    }
-    for (std::size_t k = 0; k < scratch.places.size() && own.size() < kFewSites; ++k) {
-      if (part_of[k] == part) own.push_back(scratch.places[k]);
-    }
-    while (own.size() % num_replicates != 0 && own.size() > num_replicates) own.pop_back();
-    for (std::size_t s = 0; own.size() % num_replicates != 0; ++s) own.push_back(Site(own[s]));
+    place_sites_of_part(part, sites, part_of_site, part_of, num_replicates, scratch);
     const Reception reception = receive_part(scene, share, seeds, light_samples, scratch);
     rays += reception.rays;
     light_rays += reception.light_rays;
@@ -262,15 +269,17 @@ ReceivedLight Reception::mean(int num_replicates) const {
 }
 
 void replace_unseen_sites(const GatherScene& scene, std::span<const Site> known, ReceiveScratch& scratch) {
-  scratch.segments.clear();
+  std::vector<Ray>& segments = scratch.parting.segments;
+  std::vector<std::uint8_t>& is_blocked = scratch.parting.is_blocked;
+  segments.clear();
   const auto known_of = [&](std::size_t s) -> const Site& { return known[s % known.size()]; };
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
-    scratch.segments.push_back(segment_between(scene.surfaces, known_of(s), scratch.sites[s]));
+    segments.push_back(segment_between(scene.surfaces, known_of(s), scratch.sites[s]));
   }
-  scratch.is_blocked.resize(scratch.sites.size());
-  scene.visibility.blocked(scratch.segments, scratch.is_blocked);
+  is_blocked.resize(scratch.sites.size());
+  scene.visibility.blocked(segments, is_blocked);
   for (std::size_t s = 0; s < scratch.sites.size(); ++s) {
-    if (scratch.is_blocked[s] && are_coplanar(known_of(s), scratch.sites[s])) scratch.sites[s] = known_of(s);
+    if (is_blocked[s] && are_coplanar(known_of(s), scratch.sites[s])) scratch.sites[s] = known_of(s);
   }
 }
 

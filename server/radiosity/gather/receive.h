@@ -65,8 +65,6 @@ struct ReceiveScratch {
   DirectLight::Scratch light;
   RowSample row;
   RowSample other_row;
-  std::vector<Ray> segments;
-  std::vector<std::uint8_t> is_blocked;
   std::vector<std::uint8_t> is_out;
   std::vector<Site> places;
   PartingScratch parting;

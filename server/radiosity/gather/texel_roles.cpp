@@ -64,14 +64,11 @@ TexelRoles::TexelRoles(const Surfaces& surfaces, const Atlas& atlas, const Visib
       }
     }
   });
-  for (int j = 0; j + 1 < nodes_y_; ++j) {
-    for (int i = 0; i + 1 < nodes_x_; ++i) {
-      if (!is_plain(i, j)) continue;
-      for (const std::size_t node : {index_of(i, j), index_of(i + 1, j), index_of(i, j + 1), index_of(i + 1, j + 1)}) {
-        is_node_[node] = 1;
-      }
+  for_each_plain_square([this](int i, int j) {
+    for (const std::size_t node : {index_of(i, j), index_of(i + 1, j), index_of(i, j + 1), index_of(i + 1, j + 1)}) {
+      is_node_[node] = 1;
     }
-  }
+  });
 }
 
 void TexelRoles::find_homes() {

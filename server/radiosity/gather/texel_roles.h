@@ -27,10 +27,20 @@ class TexelRoles {
 
   int spacing() const { return spacing_; }
   int nodes_across() const { return nodes_x_; }
+  int nodes_down() const { return nodes_y_; }
   std::size_t num_nodes() const { return is_node_.size(); }
   /// Whether any plain square needs the node in column i, row j of nodes: texel (i spacing, j spacing).
   bool is_node(int i, int j) const { return is_node_[index_of(i, j)] != 0; }
   bool is_plain(int i, int j) const { return is_plain_[index_of(i, j)] != 0; }
+  /// Calls back with (i, j) of each plain square, in order; it may refuse that one.
+  template <typename OnSquare>
+  void for_each_plain_square(const OnSquare& on_square) const {
+    for (int j = 0; j + 1 < nodes_y_; ++j) {
+      for (int i = 0; i + 1 < nodes_x_; ++i) {
+        if (is_plain(i, j)) on_square(i, j);
+      }
+    }
+  }
   /// The square right below and right of node (i, j) is not plain after all.
   void refuse(int i, int j) { is_plain_[index_of(i, j)] = 0; }
 

@@ -24,6 +24,19 @@ PassResults after_first_pass() {
   return results;
 }
 
+/// The same after so much more effort in all, with errors by then.
+PassResults after_effort(double effort, double direct, double gathered, double discretisation) {
+  PassResults results = after_first_pass();
+  results.gathered_effort = results.direct_effort = effort;
+  results.gathered_rays *= effort;
+  results.direct_rays *= effort;
+  results.direct_sampling = direct;
+  results.gathered_sampling = gathered;
+  results.discretisation = discretisation;
+  results.error = std::hypot(direct, gathered, discretisation);
+  return results;
+}
+
 /// What a pass of so much more makes of it, as the plan's model has it.
 void advance(const NextPass& next, PassResults& results) {
   const double direct = results.direct_effort / (results.direct_effort + next.scale.direct);
@@ -110,14 +123,7 @@ TEST(PassPlan, RefinesPatchesWhereTheirSizeLeads) {
 
 // Smaller patches drop what was gathered from larger ones.
 TEST(PassPlan, KeepsPatchesWhereTheTimeLeftGathersLessThanIsDropped) {
-  PassResults results = after_first_pass();
-  results.gathered_effort = results.direct_effort = 100;
-  results.gathered_rays *= 100;
-  results.direct_rays *= 100;
-  results.gathered_sampling /= 10;
-  results.direct_sampling /= 10;
-  results.discretisation = 0.008;
-  results.error = std::hypot(results.direct_sampling, results.gathered_sampling, results.discretisation);
+  PassResults results = after_effort(100, 0.004, 0.003, 0.008);
   results.last_direct_scale = results.last_gathered_scale = 60;
   results.last_seconds = 12;
   results.num_passes = 4;
@@ -134,13 +140,7 @@ TEST(PassPlan, KeepsPatchesWhereTheTimeLeftGathersLessThanIsDropped) {
 }
 
 TEST(PassPlan, StopsInterpolatingWhereThatIsAllThatIsLeft) {
-  PassResults results = after_first_pass();
-  results.gathered_effort = results.direct_effort = 16;
-  results.gathered_rays *= 16;
-  results.direct_rays *= 16;
-  results.direct_sampling = results.gathered_sampling = 0.009;
-  results.discretisation = 0.02;
-  results.error = std::hypot(results.direct_sampling, results.gathered_sampling, results.discretisation);
+  PassResults results = after_effort(16, 0.009, 0.009, 0.02);
   NoPass no_pass;
   EXPECT_FALSE(plan_next_pass(results, 0.02, no_pass));
   EXPECT_EQ(no_pass.limited_by, "discretisation");

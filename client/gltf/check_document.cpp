@@ -12,10 +12,18 @@ namespace {
 using nlohmann::json;
 
 // Read, or read and warned about.
-constexpr std::array<std::string_view, 10> kRead = {
-    "KHR_materials_emissive_strength", "KHR_lights_punctual",   "KHR_draco_mesh_compression", "KHR_materials_unlit",
-    "KHR_materials_transmission",      "KHR_mesh_quantization", "KHR_texture_transform",      "KHR_materials_volume",
-    "KHR_materials_clearcoat",         "KHR_materials_ior"};
+constexpr std::array<std::string_view, 12> kRead = {"KHR_materials_emissive_strength",
+                                                    "KHR_lights_punctual",
+                                                    "KHR_draco_mesh_compression",
+                                                    "KHR_materials_unlit",
+                                                    "KHR_materials_transmission",
+                                                    "KHR_mesh_quantization",
+                                                    "KHR_texture_transform",
+                                                    "KHR_materials_volume",
+                                                    "KHR_materials_clearcoat",
+                                                    "KHR_materials_ior",
+                                                    "KHR_materials_diffuse_transmission",
+                                                    "EXT_lights_ies"};
 // Gloss, or nothing that is seen, or light of an earlier bake: no effect on diffuse light.
 constexpr std::array<std::string_view, 8> kWithoutEffect = {
     "KHR_materials_specular", "KHR_materials_anisotropy", "KHR_materials_iridescence", "KHR_materials_dispersion",

@@ -69,6 +69,15 @@ Result<void> check_material(const Entry& material, std::size_t num_textures) {
     RADBAKE_RETURN_IF_ERROR(transmission->number("transmissionFactor", 0, 1));
     RADBAKE_RETURN_IF_ERROR(check_texture(*transmission, "transmissionTexture", num_textures));
   }
+  RADBAKE_ASSIGN_OR_RETURN(const auto diffuse, material.extension("KHR_materials_diffuse_transmission"));
+  if (diffuse) {
+    RADBAKE_RETURN_IF_ERROR(diffuse->number("diffuseTransmissionFactor", 0, 1));
+    RADBAKE_RETURN_IF_ERROR(diffuse->numbers("diffuseTransmissionColorFactor", 3, 0, 1));
+    for (const char* key : {"diffuseTransmissionTexture", "diffuseTransmissionColorTexture"}) {
+      RADBAKE_RETURN_IF_ERROR(check_texture(*diffuse, key, num_textures));
+      RADBAKE_RETURN_IF_ERROR(check_texture_transform(*diffuse, key));
+    }
+  }
   RADBAKE_ASSIGN_OR_RETURN(const auto volume, material.extension("KHR_materials_volume"));
   if (volume) RADBAKE_RETURN_IF_ERROR(volume->number("thicknessFactor", 0, kMaxStrength));
   RADBAKE_ASSIGN_OR_RETURN(const auto clear_coat, material.extension("KHR_materials_clearcoat"));
@@ -109,7 +118,28 @@ Result<void> check_materials(const Entry& root) {
   return {};
 }
 
+namespace {
+
+Result<void> check_profiles(const Entry& root) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> extension, root.extension("EXT_lights_ies"));
+  if (!extension) return {};
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> profiles, extension->list("lights", "light profile"));
+  for (const Entry& profile : profiles) {
+    RADBAKE_RETURN_IF_ERROR(profile.text("name"));
+    RADBAKE_RETURN_IF_ERROR(profile.text("uri"));
+    RADBAKE_ASSIGN_OR_RETURN(const auto view,
+                             profile.index("bufferView", list_size(root, "bufferViews"), "buffer views"));
+    if (view.has_value() == (profile.find("uri") != nullptr)) {
+      return profile.error("it needs either a uri or a bufferView");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<void> check_lights(const Entry& root) {
+  RADBAKE_RETURN_IF_ERROR(check_profiles(root));
   RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> extension, root.extension("KHR_lights_punctual"));
   if (!extension) return {};
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> lights, extension->list("lights", "light"));

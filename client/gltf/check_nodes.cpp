@@ -26,7 +26,17 @@ std::size_t node_on_cycle(const std::vector<std::size_t>& parents) {
   return kNoParent;
 }
 
-Result<void> check_node(const Entry& node, const Entry& root, std::size_t num_lights) {
+// A light that a node places, of those that the file lists under this extension.
+Result<std::optional<Entry>> check_placed_light(const Entry& node, const Entry& root, const char* name) {
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> light, node.extension(name));
+  if (!light) return light;
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> lights, root.extension(name));
+  RADBAKE_RETURN_IF_ERROR(light->required_whole_number("light"));
+  RADBAKE_RETURN_IF_ERROR(light->index("light", lights ? list_size(*lights, "lights") : 0, "lights"));
+  return light;
+}
+
+Result<void> check_node(const Entry& node, const Entry& root) {
   RADBAKE_RETURN_IF_ERROR(node.text("name"));
   RADBAKE_RETURN_IF_ERROR(check_texel_density(node));
   RADBAKE_RETURN_IF_ERROR(node.index("mesh", list_size(root, "meshes"), "meshes"));
@@ -35,10 +45,12 @@ Result<void> check_node(const Entry& node, const Entry& root, std::size_t num_li
   RADBAKE_RETURN_IF_ERROR(node.numbers("translation", 3));
   RADBAKE_RETURN_IF_ERROR(node.numbers("rotation", 4));
   RADBAKE_RETURN_IF_ERROR(node.numbers("scale", 3));
-  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> light, node.extension("KHR_lights_punctual"));
-  if (light) {
-    RADBAKE_RETURN_IF_ERROR(light->required_whole_number("light"));
-    RADBAKE_RETURN_IF_ERROR(light->index("light", num_lights, "lights"));
+  RADBAKE_RETURN_IF_ERROR(check_placed_light(node, root, "KHR_lights_punctual"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto luminaire, check_placed_light(node, root, "EXT_lights_ies"));
+  if (luminaire) {
+    constexpr double kMaxMultiplier = 2e9;
+    RADBAKE_RETURN_IF_ERROR(luminaire->number("multiplier", 0, kMaxMultiplier));
+    RADBAKE_RETURN_IF_ERROR(luminaire->numbers("color", 3, 0, kMaxMultiplier));
   }
   return {};
 }
@@ -46,12 +58,10 @@ Result<void> check_node(const Entry& node, const Entry& root, std::size_t num_li
 }  // namespace
 
 Result<void> check_nodes(const Entry& root) {
-  RADBAKE_ASSIGN_OR_RETURN(const std::optional<Entry> lights, root.extension("KHR_lights_punctual"));
-  const std::size_t num_lights = lights ? list_size(*lights, "lights") : 0;
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<Entry> nodes, root.list("nodes", "node"));
   std::vector<std::size_t> parents(nodes.size(), kNoParent);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    RADBAKE_RETURN_IF_ERROR(check_node(nodes[i], root, num_lights));
+    RADBAKE_RETURN_IF_ERROR(check_node(nodes[i], root));
     RADBAKE_ASSIGN_OR_RETURN(const std::vector<std::uint64_t> children,
                              nodes[i].indices("children", nodes.size(), "nodes"));
     for (const std::uint64_t child : children) {

@@ -78,8 +78,9 @@ struct LocalMesh {
 // Reads one file; messages leave its name to the caller.
 class SceneReader {
  public:
-  SceneReader(const tinygltf::Model& model, const ImageDecoder& decode_image, const ReadOptions& options)
-      : model_(model), options_(options), materials_(model, decode_image, options) {}
+  SceneReader(const tinygltf::Model& model, const std::filesystem::path& folder, const ImageDecoder& decode_image,
+              const ReadOptions& options)
+      : model_(model), folder_(folder), options_(options), materials_(model, decode_image, options) {}
 
   Result<GltfScene> read(const std::vector<std::string>& ignored_extensions) {
     RADBAKE_ASSIGN_OR_RETURN(const std::vector<PlacedNode> nodes, place_nodes(model_));
@@ -97,7 +98,7 @@ class SceneReader {
       }
     }
     if (result_.scene.meshes.empty()) return nothing_left();
-    RADBAKE_ASSIGN_OR_RETURN(result_.scene.lights, read_lights(model_, nodes));
+    RADBAKE_ASSIGN_OR_RETURN(result_.scene.lights, read_lights(model_, folder_, nodes));
     result_.scene.materials = std::move(materials_.materials());
     result_.scene.textures = std::move(materials_.textures());
     result_.num_triangles_dropped = counts_.num_triangles_dropped;
@@ -244,6 +245,7 @@ class SceneReader {
   }
 
   const tinygltf::Model& model_;
+  const std::filesystem::path folder_;
   const ReadOptions& options_;
   MaterialReader materials_;
   ReadCounts counts_;
@@ -260,7 +262,7 @@ Result<GltfScene> read_unnamed(const std::filesystem::path& path, const ImageDec
   RADBAKE_ASSIGN_OR_RETURN(nlohmann::json document, parse_json(file.json));
   RADBAKE_RETURN_IF_ERROR(check_document(document, path.parent_path(), file.bin.size()));
   RADBAKE_ASSIGN_OR_RETURN(const tinygltf::Model model, load_model(document, file.bin, path.parent_path()));
-  return SceneReader(model, decode_image, options).read(ignored_extensions(document));
+  return SceneReader(model, path.parent_path(), decode_image, options).read(ignored_extensions(document));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <span>
 #include <vector>
 
@@ -9,12 +10,15 @@
 
 namespace radbake::gltf {
 
-/// The lamps of KHR_lights_punctual in the world: they shine along -Z of their node, and its scale changes nothing but
-/// the direction. Lamps without intensity are left out.
+/// The lamps of KHR_lights_punctual and the luminaires of EXT_lights_ies in the world: they shine along -Z of their
+/// node, and its scale changes nothing but the direction; horizontal angle 0 of a luminaire is +X, 90 degrees +Y. Those
+/// without intensity are left out.
 ///
+/// folder: of the scene's file, in which files of intensities lie.
 /// Units:  cd for point and spot, lx for directional, each times the lamp's colour.
 /// Errors: kInvalidArgument, naming the node: its place or direction is not finite, or a spot's inner cone is not
-///         inside its outer cone.
-Result<std::vector<Light>> read_lights(const tinygltf::Model& model, std::span<const PlacedNode> nodes);
+///         inside its outer cone, or a file of intensities cannot be read.
+Result<std::vector<Light>> read_lights(const tinygltf::Model& model, const std::filesystem::path& folder,
+                                       std::span<const PlacedNode> nodes);
 
 }  // namespace radbake::gltf

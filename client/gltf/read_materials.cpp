@@ -80,6 +80,23 @@ void read_flags(const tinygltf::Material& source, Material& material, const Mate
   material.is_refractive = transmission_of(source) > 0 && (material.has_volume || ior != kDefaultIor);
 }
 
+const tinygltf::Value* diffuse_transmission(const tinygltf::Material& material) {
+  return is_unlit(material) ? nullptr : extension(material.extensions, "KHR_materials_diffuse_transmission");
+}
+
+// A texture that an extension uses: tinygltf leaves it as it stands in the file. Index -1: there is none.
+tinygltf::TextureInfo texture_info(const tinygltf::Value* object, const char* key) {
+  tinygltf::TextureInfo info;
+  if (object == nullptr || !object->Has(key)) return info;
+  const tinygltf::Value& texture = object->Get(key);
+  info.index = texture.Get("index").GetNumberAsInt();
+  info.texCoord = static_cast<int>(number(&texture, "texCoord", 0));
+  if (!texture.Has("extensions")) return info;
+  const tinygltf::Value& extensions = texture.Get("extensions");
+  for (const std::string& name : extensions.Keys()) info.extensions[name] = extensions.Get(name);
+  return info;
+}
+
 bool is_emissive(const tinygltf::Material& material) {
   if (number(extension(material.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1) <= 0)
     return false;
@@ -229,6 +246,40 @@ Result<void> MaterialReader::read_reflectance(const tinygltf::Material& source, 
   return {};
 }
 
+Result<void> MaterialReader::read_diffuse_transmission(const tinygltf::Material& source, Material& material,
+                                                       MaterialFacts& facts) {
+  const tinygltf::Value* diffuse = diffuse_transmission(source);
+  double share = number(diffuse, "diffuseTransmissionFactor", 0);
+  if (share <= 0) return {};
+  const tinygltf::TextureInfo shares = texture_info(diffuse, "diffuseTransmissionTexture");
+  if (shares.index >= 0) {
+    // The share stands in the alpha channel; where there is none it is 1.
+    RADBAKE_ASSIGN_OR_RETURN(const TexturePlane* plane, decoded(shares.index, false));
+    double sum = 0;
+    const auto step = static_cast<std::size_t>(plane->channels);
+    for (std::size_t at = 0; at < plane->values.size(); at += step) sum += step == 4 ? plane->values[at + 3] : 1.0;
+    share *= sum / (static_cast<double>(plane->width) * plane->height);
+    facts.has_diffuse_transmission_texture = true;
+  }
+  // What goes straight through comes first, and metal lets nothing through.
+  RADBAKE_ASSIGN_OR_RETURN(const MetalUse metal, read_metal(source));
+  Vec3 color{1, 1, 1};
+  if (diffuse->Has("diffuseTransmissionColorFactor")) {
+    const tinygltf::Value& factors = diffuse->Get("diffuseTransmissionColorFactor");
+    for (int c = 0; c < 3; ++c) color[c] = factors.Get(c).GetNumberAsDouble();
+  }
+  for (int c = 0; c < 3; ++c) color[c] = std::fmin(color[c], options_.max_reflectance);
+  material.diffuse_transmittance = color * (share * metal.mean.dielectric * (1 - transmission_of(source)));
+  material.reflectance *= 1 - share * metal.mean.dielectric;
+  if (max_component(material.diffuse_transmittance) <= 0) return {};
+  material.is_double_sided = true;
+  const tinygltf::TextureInfo colors = texture_info(diffuse, "diffuseTransmissionColorTexture");
+  if (colors.index < 0) return {};
+  material.diffuse_transmittance_texture = reference(colors);
+  RADBAKE_ASSIGN_OR_RETURN(material.diffuse_transmittance_texture->texture, scene_texture({.texture = colors.index}));
+  return {};
+}
+
 Result<void> MaterialReader::read_emission(const tinygltf::Material& source, Material& material) {
   for (int c = 0; c < 3 && !source.emissiveFactor.empty(); ++c) material.emissive[c] = source.emissiveFactor[c];
   material.emissive *= number(extension(source.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
@@ -243,6 +294,7 @@ Result<void> MaterialReader::read(const tinygltf::Material& source, Material& ma
   RADBAKE_RETURN_IF_ERROR(read_reflectance(source, material, facts));
   RADBAKE_RETURN_IF_ERROR(read_emission(source, material));
   material.is_double_sided = source.doubleSided;
+  RADBAKE_RETURN_IF_ERROR(read_diffuse_transmission(source, material, facts));
   facts.is_unlit = is_unlit(source);
   facts.has_normal_map = source.normalTexture.index >= 0;
   const tinygltf::Value* transmission = extension(source.extensions, "KHR_materials_transmission");
@@ -256,15 +308,20 @@ Result<int> MaterialReader::texcoord0_set(int index) const {
   const tinygltf::Material& material = model_.materials[index];
   const tinygltf::TextureInfo& color = material.pbrMetallicRoughness.baseColorTexture;
   const tinygltf::TextureInfo& emission = material.emissiveTexture;
-  std::vector<int> sets;
-  if (color.index >= 0) sets.push_back(texcoord_set(color));
-  if (emission.index >= 0 && is_emissive(material)) sets.push_back(texcoord_set(emission));
-  std::erase(sets, 1);
+  const tinygltf::TextureInfo through =
+      texture_info(diffuse_transmission(material), "diffuseTransmissionColorTexture");
+  std::vector<std::pair<int, std::string>> sets;
+  if (color.index >= 0) sets.emplace_back(texcoord_set(color), "baseColorTexture");
+  if (emission.index >= 0 && is_emissive(material)) sets.emplace_back(texcoord_set(emission), "emissiveTexture");
+  if (through.index >= 0) sets.emplace_back(texcoord_set(through), "diffuseTransmissionColorTexture");
+  std::erase_if(sets, [](const auto& use) { return use.first == 1; });
   if (sets.empty()) return 0;
-  if (sets.front() == sets.back()) return sets.front();
-  return invalid_argument(numbered("material", static_cast<std::size_t>(index), material.name) +
-                          ": baseColorTexture uses TEXCOORD_" + std::to_string(sets.front()) +
-                          " and emissiveTexture TEXCOORD_" + std::to_string(sets.back()) +
+  const auto other =
+      std::find_if(sets.begin(), sets.end(), [&](const auto& use) { return use.first != sets.front().first; });
+  if (other == sets.end()) return sets.front().first;
+  return invalid_argument(numbered("material", static_cast<std::size_t>(index), material.name) + ": " +
+                          sets.front().second + " uses TEXCOORD_" + std::to_string(sets.front().first) + " and " +
+                          other->second + " TEXCOORD_" + std::to_string(other->first) +
                           "; beside TEXCOORD_1 one set is read");
 }
 

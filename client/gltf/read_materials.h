@@ -20,6 +20,7 @@ struct MaterialFacts {
   Vec3 untextured;           ///< reflectance before it was limited; zero where a texture multiplies it
   bool is_metallic = false;
   bool has_transmission_texture = false;
+  bool has_diffuse_transmission_texture = false;  ///< of the share, not of the colour
   bool has_normal_map = false;
   bool is_unlit = false;
 };
@@ -40,6 +41,8 @@ class MaterialReader {
   ///
   ///   reflectance = base (diffuse - T dielectric),   transmittance = base T dielectric,   T: transmission factor
   ///
+  /// Diffuse transmission takes its share D of what is reflected: reflectance (1 - D), diffuse transmittance D times its
+  /// colour, at most the limit; D is the mean where a texture multiplies it.
   /// A texture of metalness and roughness is followed texel by texel, at the centres of the base colour's texels, where
   /// both are looked up alike and nothing is transmitted; elsewhere by the mean of its shares.
   /// Errors: kInvalidArgument, naming the material and the texture or image.
@@ -72,6 +75,7 @@ class MaterialReader {
 
   Result<void> read(const tinygltf::Material& source, Material& material, MaterialFacts& facts);
   Result<void> read_reflectance(const tinygltf::Material& source, Material& material, MaterialFacts& facts);
+  Result<void> read_diffuse_transmission(const tinygltf::Material& source, Material& material, MaterialFacts& facts);
   Result<void> read_emission(const tinygltf::Material& source, Material& material);
   Result<MetalUse> read_metal(const tinygltf::Material& source);
   double share_at(const PlaneUse& use, const TexturePlane& base, std::size_t texel) const;

@@ -56,6 +56,8 @@ std::vector<Warning> scene_warnings(std::span<const Material> materials, std::sp
        [](const MaterialFacts& f) { return f.is_metallic; });
   warn("transmission_texture_ignored", "textures of transmission are not followed: the factor holds everywhere",
        [](const MaterialFacts& f) { return f.has_transmission_texture; });
+  warn("diffuse_transmission_texture_as_mean", "textures of the share of diffuse transmission count with their mean",
+       [](const MaterialFacts& f) { return f.has_diffuse_transmission_texture; });
   warn("normal_map_not_simulated", "normal maps do not change the baked light",
        [](const MaterialFacts& f) { return f.has_normal_map; });
   warn("unlit", "unlit materials are baked as diffuse surfaces of their base colour",

@@ -22,6 +22,8 @@ Vec3 strength(const Light& light) {
       [](const auto& kind) {
         if constexpr (requires { kind.illuminance; }) {
           return kind.illuminance;
+        } else if constexpr (requires { kind.profile; }) {
+          return kind.tint * kind.profile.lumens();
         } else {
           return kind.intensity;
         }

@@ -38,6 +38,14 @@ Result<Vec3> read_transmittance(const v1::Rgb& rgb, Vec3 reflectance, const std:
                           " through: more than 1 together");
 }
 
+/// What goes through scattered; absent: nothing. What is reflected and this stay below 1 together.
+Result<Vec3> read_diffuse_transmittance(const v1::Rgb& rgb, Vec3 reflectance, const std::string& owner) {
+  const Vec3 share = to_vec(rgb);
+  if (is_finite(share) && min_component(share) >= 0 && max_component(reflectance + share) < 1) return share;
+  return invalid_argument(owner + " reflects " + describe(reflectance) + " and scatters " + describe(share) +
+                          " through: each must be at least 0, and both together below 1");
+}
+
 /// A colour of light: finite and not negative. `owner` and `what` are for the message.
 Result<Vec3> read_light_color(const v1::Rgb& rgb, const std::string& owner, const char* what) {
   const Vec3 color = to_vec(rgb);
@@ -125,6 +133,11 @@ v1::Material to_proto(const Material& material) {
   out.set_alpha(material.alpha);
   out.set_alpha_cutoff(material.alpha_cutoff);
   if (!(material.transmittance == Vec3{})) *out.mutable_transmittance() = rgb_to_proto(material.transmittance);
+  if (!(material.diffuse_transmittance == Vec3{})) {
+    *out.mutable_diffuse_transmittance() = rgb_to_proto(material.diffuse_transmittance);
+    write_reference(material.diffuse_transmittance_texture,
+                    [&] { return out.mutable_diffuse_transmittance_texture(); });
+  }
   out.set_is_specular(material.is_specular);
   out.set_is_refractive(material.is_refractive);
   out.set_has_normal_map(material.has_normal_map);
@@ -148,6 +161,16 @@ v1::Light to_proto(const Light& light) {
           *out.mutable_spot()->mutable_intensity() = rgb_to_proto(kind.intensity);
           out.mutable_spot()->set_inner_cone_radians(kind.inner_cone_radians);
           out.mutable_spot()->set_outer_cone_radians(kind.outer_cone_radians);
+        } else if constexpr (std::is_same_v<Kind, ProfileLight>) {
+          v1::ProfileLight& profile = *out.mutable_profile();
+          *profile.mutable_position() = vector_to_proto(kind.position);
+          *profile.mutable_direction() = vector_to_proto(kind.direction);
+          *profile.mutable_zero_side() = vector_to_proto(kind.zero_side);
+          *profile.mutable_tint() = rgb_to_proto(kind.tint);
+          const LightProfile& table = kind.profile;
+          profile.mutable_vertical_degrees()->Add(table.vertical_degrees.begin(), table.vertical_degrees.end());
+          profile.mutable_horizontal_degrees()->Add(table.horizontal_degrees.begin(), table.horizontal_degrees.end());
+          profile.mutable_candela()->Add(table.candela.begin(), table.candela.end());
         } else {
           *out.mutable_directional()->mutable_direction() = vector_to_proto(kind.direction);
           *out.mutable_directional()->mutable_illuminance() = rgb_to_proto(kind.illuminance);
@@ -190,12 +213,40 @@ Result<Material> read_material(const v1::Material& material, int num_textures) {
                             ": must be finite and not negative");
   }
   RADBAKE_ASSIGN_OR_RETURN(out.transmittance, read_transmittance(material.transmittance(), out.reflectance, owner));
+  RADBAKE_ASSIGN_OR_RETURN(out.diffuse_transmittance,
+                           read_diffuse_transmittance(material.diffuse_transmittance(), out.reflectance, owner));
+  if (material.has_diffuse_transmittance_texture()) {
+    RADBAKE_ASSIGN_OR_RETURN(out.diffuse_transmittance_texture,
+                             read_reference(material.diffuse_transmittance_texture(), num_textures, owner));
+  }
   out.is_specular = material.is_specular();
   out.is_refractive = material.is_refractive();
   out.has_normal_map = material.has_normal_map();
   out.has_volume = material.has_volume();
   return out;
 }
+
+namespace {
+
+Result<ProfileLight> read_profile(const v1::ProfileLight& profile, const std::string& owner) {
+  ProfileLight out;
+  RADBAKE_ASSIGN_OR_RETURN(out.position, read_position(profile.position(), owner));
+  RADBAKE_ASSIGN_OR_RETURN(out.direction, read_direction(profile.direction(), owner));
+  RADBAKE_ASSIGN_OR_RETURN(out.zero_side, read_direction(profile.zero_side(), owner));
+  if (std::abs(dot(out.direction, out.zero_side)) > kUnitLengthTolerance) {
+    return invalid_argument(owner + " has a zero side " + describe(out.zero_side) +
+                            " that is not at right angles to its direction " + describe(out.direction));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(out.tint, read_light_color(profile.tint(), owner, "tint"));
+  out.profile = {{profile.vertical_degrees().begin(), profile.vertical_degrees().end()},
+                 {profile.horizontal_degrees().begin(), profile.horizontal_degrees().end()},
+                 {profile.candela().begin(), profile.candela().end()}};
+  const Result<void> checked = check_profile(out.profile);
+  if (!checked.ok()) return invalid_argument(owner + ": " + checked.error().message);
+  return out;
+}
+
+}  // namespace
 
 Result<Light> read_light(const v1::Light& light) {
   const std::string owner = "light '" + light.name() + "'";
@@ -231,6 +282,8 @@ Result<Light> read_light(const v1::Light& light) {
                               " rad: must be at least 0 and below pi");
     }
     out.kind = sun;
+  } else if (light.has_profile()) {
+    RADBAKE_ASSIGN_OR_RETURN(out.kind, read_profile(light.profile(), owner));
   } else {
     return invalid_argument(owner + " is of no kind that this version knows");
   }

@@ -6,9 +6,10 @@
 namespace radbake {
 
 /// The effects that a plan decides, by the ids that users see, in the order of Plan.effects.
-inline constexpr std::array<std::string_view, 22> kEffectNames = {"emitters",
+inline constexpr std::array<std::string_view, 24> kEffectNames = {"emitters",
                                                                   "point",
                                                                   "spot",
+                                                                  "ies",
                                                                   "directional",
                                                                   "sun",
                                                                   "sky",
@@ -20,6 +21,7 @@ inline constexpr std::array<std::string_view, 22> kEffectNames = {"emitters",
                                                                   "textured_emission",
                                                                   "alpha_mask",
                                                                   "tint",
+                                                                  "diffuse_transmission",
                                                                   "two_sided",
                                                                   "vertices",
                                                                   "layers",

@@ -11,6 +11,7 @@
 
 #include "common/geometry/transform.h"
 #include "common/geometry/vector.h"
+#include "common/scene/light_profile.h"
 
 namespace radbake {
 
@@ -67,6 +68,10 @@ struct Material {
   /// A thin sheet: this share of the light goes straight through. The reflectance texture multiplies it too;
   /// reflectance + transmittance <= 1 in each channel.
   Vec3 transmittance = {};
+  /// A leaf, a curtain: this share tau of the light that arrives on one side leaves the other one, scattered; the texture
+  /// multiplies it. reflectance + diffuse_transmittance < 1 in each channel. Both sides send and receive light then.
+  Vec3 diffuse_transmittance = {};
+  std::optional<TextureReference> diffuse_transmittance_texture = std::nullopt;
   // What the file asks for and a diffuse bake does not simulate.
   bool is_specular = false;    ///< mirrors or shines: metal, clear coat, roughness below one half
   bool is_refractive = false;  ///< has an inside that bends light
@@ -114,9 +119,18 @@ struct DirectionalLight {
   double angular_diameter_radians = 0;  ///< of the disc, below pi; 0: parallel light, hard shadows
 };
 
+/// A luminaire's measured intensities, at a point (EXT_lights_ies).
+struct ProfileLight {
+  Vec3 position;
+  Vec3 direction;  ///< of vertical angle 0, unit length
+  Vec3 zero_side;  ///< of horizontal angle 0, unit length, at right angles to `direction`
+  Vec3 tint{1, 1, 1};
+  LightProfile profile;
+};
+
 struct Light {
   std::string name;
-  std::variant<PointLight, SpotLight, DirectionalLight> kind;
+  std::variant<PointLight, SpotLight, DirectionalLight, ProfileLight> kind;
 };
 
 /// Direction in which one looks -> place in an equirectangular image: u = atan2(z, x) / 2 pi + 1/2, v = acos(y) / pi.

@@ -19,7 +19,8 @@ grpc::ServerUnaryReactor* ServerService::GetCapabilities(grpc::CallbackServerCon
   capabilities->add_estimators("hemisphere");
   capabilities->add_transports("sparse");
   capabilities->add_solvers("gauss-seidel");
-  for (const char* light : {"emitters", "sky", "sun", "point", "spot", "directional"}) capabilities->add_lights(light);
+  for (const char* light : {"emitters", "sky", "sun", "point", "spot", "ies", "directional"})
+    capabilities->add_lights(light);
   capabilities->set_cores(std::thread::hardware_concurrency());
   reactor->Finish(check_protocol(*context));
   return reactor;

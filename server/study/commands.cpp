@@ -1,9 +1,12 @@
 #include "server/study/commands.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <tuple>
+#include <utility>
 
 #include "client/image/write_image.h"
 #include "server/settings/to_options.h"
@@ -15,6 +18,7 @@
 #include "server/study/enclosure_study.h"
 #include "server/study/rates_study.h"
 #include "server/study/study_scene.h"
+#include "server/study/view_scene.h"
 
 namespace radbake::study {
 namespace {
@@ -169,6 +173,46 @@ ExitCode run_accuracy(const AccuracyChoices& choices) {
   const auto written = write_text(std::filesystem::path(folder) / "accuracy.md", page);
   if (!written.ok()) return fail(written.error(), kNotWritten);
   return write_study(folder, "accuracy", accuracy_csv(*study), accuracy_plot(*study));
+}
+
+namespace {
+
+/// "960x640"
+Result<std::pair<int, int>> parse_size(const std::string& text) {
+  constexpr int kMost = 8192;
+  int width = 0, height = 0, end = 0;
+  if (std::sscanf(text.c_str(), "%5dx%5d%n", &width, &height, &end) == 2 &&
+      static_cast<std::size_t>(end) == text.size() && width >= 1 && height >= 1 && width <= kMost && height <= kMost) {
+    return std::pair(width, height);
+  }
+  return invalid_argument("size '" + text + "' is not WIDTHxHEIGHT, each from 1 to " + std::to_string(kMost));
+}
+
+}  // namespace
+
+ExitCode run_view(const ViewChoices& choices) {
+  ViewOptions options;
+  const auto size = parse_size(choices.size);
+  if (!size.ok()) return fail(size.error(), kUsage);
+  std::tie(options.width, options.height) = *size;
+  options.samples = choices.samples;
+  if (choices.background.size() == 3) {
+    options.background = {choices.background[0], choices.background[1], choices.background[2]};
+  }
+  Camera camera;
+  if (!choices.camera.empty()) {
+    const auto parsed = parse_camera(choices.camera);
+    if (!parsed.ok()) return fail(parsed.error(), kUsage);
+    camera = *parsed;
+  }
+  const auto baked = read_baked_scene(choices.folder);
+  if (!baked.ok()) return fail(baked.error(), kBadInput);
+  if (choices.camera.empty()) camera = default_camera(baked->scene);
+  const auto picture = render_view(*baked, camera, options);
+  if (!picture.ok()) return fail(picture.error(), kUsage);
+  const auto written =
+      image::write_png(choices.picture, options.width, options.height, developed(*picture, choices.exposure));
+  return written.ok() ? kDone : fail(written.error(), kNotWritten);
 }
 
 }  // namespace radbake::study

@@ -3,6 +3,7 @@
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "client/options/bake_options.h"
 #include "server/study/form_factor_study.h"
@@ -44,6 +45,17 @@ struct AccuracyChoices {
   double bake_limit_seconds = 0;  ///< of a fixed setting; 0: as AccuracySweep has it
 };
 
+/// What `view` draws.
+struct ViewChoices {
+  std::string folder;   ///< of a bake
+  std::string picture;  ///< PNG
+  std::string camera;   ///< empty: default_camera()
+  std::string size = "960x640";
+  int samples = 3;
+  double exposure = 0;
+  std::vector<double> background;  ///< nit; empty: black
+};
+
 /// Each runs a command, prints its table on stdout and its errors on stderr.
 ExitCode run_form_factors(const CaseChoices& choices);
 ExitCode run_enclosures(const CaseChoices& choices);
@@ -51,5 +63,6 @@ ExitCode run_rates(const std::string& cases, const std::string& folder);
 ExitCode run_convergence(const SceneChoices& choices);
 ExitCode run_bake(const SceneChoices& choices);
 ExitCode run_accuracy(const AccuracyChoices& choices);
+ExitCode run_view(const ViewChoices& choices);
 
 }  // namespace radbake::study

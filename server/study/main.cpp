@@ -125,6 +125,32 @@ CLI::App* add_accuracy(CLI::App& app, AccuracyChoices& choices) {
   return sub;
 }
 
+CLI::App* add_view(CLI::App& app, ViewChoices& choices) {
+  CLI::App* sub = app.add_subcommand("view", "Draws a baked room with its lightmaps, as a PNG");
+  sub->add_option("DIR", choices.folder, "Folder that `radbake submit` wrote")->required();
+  sub->add_option("-o,--out", choices.picture, "Picture to write, PNG")->required()->type_name("FILE");
+  sub->add_option(
+         "--camera", choices.camera,
+         "Eye and target in metres, and degrees across the longer side; default: from a corner across the room")
+      ->type_name("X,Y,Z,X,Y,Z[,DEGREES]");
+  sub->add_option("--size", choices.size, "Pixels")->type_name("WxH")->capture_default_str();
+  sub->add_option("--samples", choices.samples, "Rays along either side of a pixel")
+      ->check(CLI::Range(1, 16))
+      ->type_name("N")
+      ->capture_default_str();
+  sub->add_option("--exposure", choices.exposure, "White for a luminance of 4 / E nit; default: by the brightest parts")
+      ->check(check_positive, "")
+      ->type_name("E");
+  sub->add_option("--background", choices.background, "Luminance outside, nit; default: black")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("R,G,B");
+  sub->footer(
+      "\nExample:\n  radbake submit tests/scenes/cornell.glb -o baked --max-error 2%\n"
+      "  radbake-study view baked -o cornell.png\n");
+  return sub;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -141,6 +167,8 @@ int main(int argc, char** argv) {
   const CLI::App* for_convergence = add_convergence(app, convergence);
   AccuracyChoices accuracy;
   const CLI::App* for_accuracy = add_accuracy(app, accuracy);
+  ViewChoices view;
+  const CLI::App* for_view = add_view(app, view);
   add_bake(app, bake);
   try {
     app.parse(argc, argv);
@@ -152,5 +180,6 @@ int main(int argc, char** argv) {
   if (for_rates->parsed()) return run_rates(rates.cases, rates_folder);
   if (for_convergence->parsed()) return run_convergence(convergence);
   if (for_accuracy->parsed()) return run_accuracy(accuracy);
+  if (for_view->parsed()) return run_view(view);
   return run_bake(bake);
 }

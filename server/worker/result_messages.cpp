@@ -40,6 +40,7 @@ v1::Survey to_message(const radiosity::Survey& survey) {
   out.set_num_probe_rays(survey.num_probe_rays);
   out.set_area_masked_m2(survey.area_masked_m2);
   out.set_area_tinted_m2(survey.area_tinted_m2);
+  out.set_area_translucent_m2(survey.area_translucent_m2);
   out.set_area_double_sided_m2(survey.area_double_sided_m2);
   out.set_area_specular_m2(survey.area_specular_m2);
   out.set_area_refractive_m2(survey.area_refractive_m2);

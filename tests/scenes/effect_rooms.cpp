@@ -66,6 +66,16 @@ class Room {
     spot.outer_cone_radians = 0.5;
     scene().lights.push_back({"spot", spot});
   }
+  /// Narrow, brighter to one side.
+  void luminaire(double candela) {
+    const auto i = static_cast<float>(candela);
+    ProfileLight light;
+    light.position = {0.5, 1.8, 0.5};
+    light.direction = kDown;
+    light.zero_side = {1, 0, 0};
+    light.profile = {{0, 30, 60}, {0, 180}, {i, 2 * i, 0, i, i / 2, 0}};
+    scene().lights.push_back({"luminaire", light});
+  }
   void parallel(Vec3 direction, double lux, double diameter_degrees = 0) {
     scene().lights.push_back(
         {diameter_degrees > 0 ? "sun" : "directional",
@@ -148,6 +158,14 @@ int add_glass(Room& room, Vec3 transmittance) {
   const int glass = room.material("glass", 0.1);
   room.at(glass).transmittance = transmittance;
   return glass;
+}
+
+/// A curtain: reflects and lets through.
+int add_curtain(Room& room) {
+  const int curtain = room.material("curtain", 0.3);
+  room.at(curtain).is_double_sided = true;
+  room.at(curtain).diffuse_transmittance = {0.5, 0.5, 0.5};
+  return curtain;
 }
 
 /// Turns quads, point lights and spots about two axes by odd angles.
@@ -331,6 +349,21 @@ std::vector<EffectRoom> rooms_with_effects() {
     own.sheet("glass", add_glass(own, grey(0.6)));
     own.lamp();
     rooms.push_back(room("tint", own, {"point", "occlusion", "interreflection", "tint"}, {"color"}));
+  }
+  {
+    Room own;
+    own.closed();
+    own.sheet("curtain", add_curtain(own));
+    own.lamp();
+    rooms.push_back(room("diffuse_transmission", own,
+                         {"point", "occlusion", "interreflection", "diffuse_transmission", "two_sided"}, {"color"}));
+  }
+  {
+    Room own;
+    own.closed();
+    own.lamp();
+    own.luminaire(2);
+    rooms.push_back(room("ies", own, {"point", "ies", "interreflection"}, {"occlusion", "color"}));
   }
   {
     Room own;

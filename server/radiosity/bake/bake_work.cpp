@@ -35,6 +35,7 @@ std::array<double, kNumEffects> light_rays_of(const Preparation& prepared, doubl
   if (survey.num_emitter_triangles > 0) of(Effect::kEmitters) = samples;
   of(Effect::kPoint) = sites * static_cast<double>(survey.point.num_facing);
   of(Effect::kSpot) = sites * static_cast<double>(survey.spot.num_facing);
+  of(Effect::kIes) = sites * static_cast<double>(survey.ies.num_facing);
   of(Effect::kDirectional) = sites * static_cast<double>(survey.directional.num_facing);
   of(Effect::kSun) = samples / 2 * static_cast<double>(survey.sun.num_facing);
   if (surfaces.scene->environment) of(Effect::kHdri) = samples;

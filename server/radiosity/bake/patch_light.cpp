@@ -27,7 +27,8 @@ std::vector<SolverSummary::Point> thinned(const std::vector<SolveStep>& history)
 
 /// The system of a channel: the other two become copies of it.
 void keep_channel(int channel, RadiositySystem& system) {
-  for (auto* values : {&system.problem.source, &system.problem.reflectance, &system.glow, &system.direct}) {
+  for (auto* values : {&system.problem.source, &system.problem.reflectance, &system.problem.transmittance, &system.glow,
+                       &system.direct}) {
     for (Vec3& value : *values) value = Vec3{1, 1, 1} * value[channel];
   }
 }
@@ -67,7 +68,7 @@ Result<std::vector<Vec3>> solve_system(const BakePlan& plan, const RadiositySyst
                           " lx): the scene passes on nearly all of its light; lower the largest reflectance, " +
                           std::to_string(plan.survey.max_reflectance) + ", or choose another --solver");
   }
-  EnergyTerms terms{radiosity, system.problem.reflectance, system.glow, system.direct, system.direct_variances};
+  EnergyTerms terms{radiosity, system.problem, system.glow, system.direct, system.direct_variances};
   terms.light_flux = system.emitted_lumens;
   // Of a channel by itself the flux of the lights is not known.
   terms.is_closed = report.transport.escape_share == 0 && report.transport.absorbed_share == 0 && !is_of_one_channel;

@@ -60,6 +60,21 @@ void fill_light(const std::vector<TakenRow>& rows, Vec3 sky, RadiositySystem& sy
   }
 }
 
+/// Lets through what arrives on the other side: direct light here, the rest by the solver.
+void fill_transmission(const Patches& patches, const std::vector<TakenRow>& rows, RadiositySystem& system) {
+  const bool transmits = std::any_of(rows.begin(), rows.end(), [](const TakenRow& taken) {
+    return max_component(taken.sample.diffuse_transmittance) > 0;
+  });
+  if (!transmits) return;
+  RadiosityProblem& problem = system.problem;
+  for (std::uint32_t i = 0; i < rows.size(); ++i) {
+    const std::uint32_t other = patches.is_back(i) ? patches.front_of(i) : patches.back_of(i);
+    problem.other_side.push_back(other == kNoPatch ? i : other);
+    problem.transmittance.push_back(other == kNoPatch ? Vec3{} : rows[i].sample.diffuse_transmittance);
+    problem.source[i] += scaled_by(problem.transmittance[i], system.direct[problem.other_side[i]]);
+  }
+}
+
 /// What the patches send by themselves, where nothing is reflected.
 void fill_glow(std::size_t num_patches, RadiositySystem& system) {
   system.glow.resize(num_patches);
@@ -209,6 +224,7 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
       on_row, stop);
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   fill_light(rows, surfaces.sky, *system);
+  fill_transmission(patches, rows, *system);
   warn_of_backs(prepared, rows, system->warnings);
   warn_of_uncertain_rows(rows, system->warnings);
 

@@ -21,8 +21,8 @@ struct EnergyBalance {
 
 /// What an audit reads. Shapes: spans [n].
 struct EnergyTerms {
-  std::span<const Vec3> radiosity;  ///< B'
-  std::span<const Vec3> reflectance;
+  std::span<const Vec3> radiosity;           ///< B'
+  const RadiosityProblem& problem;           ///< its shares of what arrives
   std::span<const Vec3> glow;                ///< E_in
   std::span<const Vec3> direct;              ///< H^direct, sky included
   std::span<const double> direct_variances;  ///< of the mean of the channels
@@ -33,7 +33,7 @@ struct EnergyTerms {
 /// Audits a solved system twice.
 ///
 ///   transported: sum A B' = sum A H^indirect + what leaves      to solver tolerance, on a reciprocal operator
-///   whole:       sum A E  = sum A (1 - rho) H + what leaves     to the standard error of the direct light
+///   whole:       sum A E  = sum A (1 - rho - tau) H + what leaves     to the standard error of the direct light
 ///
 /// In an open scene nobody counts the direct light that misses everything (and the sky and the sun have no flux of
 /// their own): there the balance starts from the direct light that arrives, and audits the transported part alone.

@@ -86,12 +86,14 @@ PatchSample PatchSampler::sample_light(std::uint32_t patch, PatchScratch& scratc
     if (scratch.is_buried[s]) continue;
     const SurfacePoint& p = scratch.sites[s].point;
     sample.reflectance += surfaces_.reflectance(p);
+    sample.diffuse_transmittance += surfaces_.diffuse_transmittance(p);
     if (!surfaces_.is_emitter[p.triangle]) sample.glow += surfaces_.exitance(p);
     ++visible;
   }
   if (visible == 0) return sample;
   sample.visible_share = static_cast<double>(visible) / static_cast<double>(scratch.sites.size());
   sample.reflectance = sample.reflectance / visible;
+  sample.diffuse_transmittance = sample.diffuse_transmittance / visible;
   sample.glow = sample.glow / visible;
 
   // Direct light: mean of the replicates, and the variance of that mean.
@@ -136,6 +138,9 @@ std::vector<std::uint8_t> find_reached_backs(const Surfaces& surfaces, const Pat
         const SurfacePoint p = patches.sample(patch, points.coordinate(s, 0, seeds), points.coordinate(s, 1, seeds));
         sites.push_back(side_site(surfaces, p, patches.normal(patch, p, surfaces)));
       }
+      // Light that meets a back which lets it through lights the front.
+      const std::uint32_t triangle = patches.pieces(patches.front_of(patch)).front().triangle;
+      if (surfaces.is_translucent(triangle)) reached[patch] = 1;
       estimator.sample_row(sites, seed, scratch, row);
       for (const std::uint32_t other : row.arrivals) {
         if (other < num_fronts) {

@@ -19,6 +19,7 @@ struct PatchSample {
   double opaque_share = 1;   ///< of its area: what stops light, reflects and emits
   std::uint32_t light_rays = 0;
   Vec3 reflectance;
+  Vec3 diffuse_transmittance;  ///< of what arrives on the other side
   Vec3 glow;                   ///< E_in, lx
   Vec3 direct;                 ///< from emitters and lamps, lx
   double direct_variance = 0;  ///< of the mean of direct's channels

@@ -124,16 +124,19 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
   facts.is_emitter = std::any_of(scratch.footprint.pieces.begin(), scratch.footprint.pieces.end(),
                                  [&](const FootprintPiece& piece) { return surfaces_.is_emitter[piece.triangle]; });
   place_sites(scene, points, x, y, scratch);
-  Receiver receiver{id, [this, &scratch](double u, double v) { return site_at(scratch.footprint, u, v); }, facts.parts};
-  // The sites that rays leave from send shadow rays too, as many as is of use there; of a part, all of them.
+  Receiver receiver{id, [this, &scratch](double u, double v) { return site_at(scratch.footprint, u, v); }, facts.parts,
+                    facts.parts_behind};
+  // The sites that rays leave from send shadow rays too, as many as is of use there; of a part or two sides, all.
   const int samples = light_samples_of(pass, id);
-  const int of_sites = facts.parts == Receiver::Parts::kSeveral
+  const bool has_two_sides = surfaces_.is_translucent(scratch.receive.sites.front().point.triangle);
+  const int of_sites = facts.parts == Receiver::Parts::kSeveral || has_two_sides
                            ? samples
                            : std::min(samples, kSamplesPerSite * static_cast<int>(scratch.receive.sites.size()));
   const Reception reception = receive(scene, receiver, seed_of(scene.seed, kRaysOfTexel, id),
                                       seed_of(scene.seed, kLightOfTexel, id), scratch.receive, of_sites);
   if (facts.parts == Receiver::Parts::kOne && receiver.parts == Receiver::Parts::kSeveral) estimate_.forget(id);
   facts.parts = receiver.parts;
+  facts.parts_behind = receiver.parts_behind;
   scratch.counts.num_rays += reception.rays;
   scratch.counts.num_light_rays += reception.light_rays;
   ++scratch.counts.num_gathered;

@@ -26,7 +26,7 @@ struct GatheredTile {
 struct TexelFacts {
   TexelState state = TexelState::kOutside;
   bool is_emitter = false;
-  Receiver::Parts parts = Receiver::Parts::kUnknown;
+  Receiver::Parts parts = Receiver::Parts::kUnknown, parts_behind = Receiver::Parts::kUnknown;
   float coverage = 0;
   float area = 0;  ///< of its footprint, scene units squared
 

@@ -77,6 +77,7 @@ VertexGather::VertexGather(const Surfaces& surfaces, const VertexGroups& groups)
       groups_(groups),
       estimate_(groups.size(), groups.size(), false, false),
       parts_(groups.size(), Receiver::Parts::kUnknown),
+      parts_behind_(parts_),
       is_known_(groups.size(), 0) {}
 
 void VertexGather::add_pass(const GatherScene& scene, int light_samples, double weight,
@@ -101,7 +102,7 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
       Receiver receiver{
           g,
           [&](double x, double y) { return front_site(surfaces_, sample_near(groups_, g, scratch.area_up_to, x, y)); },
-          parts_[g]};
+          parts_[g], parts_behind_[g]};
       scratch.receive.sites.clear();
       for (std::size_t r = 0; r < num_replicates; ++r) {
         const auto seeds = SobolPoints::seeds_of(mixed_bits(seed_of(scene.seed, kSitesOfVertex, g) + r));
@@ -114,6 +115,7 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
                                           seed_of(scene.seed, kLightOfVertex, g), scratch.receive, light_samples);
       if (parts_[g] == Receiver::Parts::kOne && receiver.parts == Receiver::Parts::kSeveral) estimate_.forget(g);
       parts_[g] = receiver.parts;
+      parts_behind_[g] = receiver.parts_behind;
       num_rays += reception.rays;
       num_light_rays += reception.light_rays;
       is_known_[g] = !reception.is_buried;

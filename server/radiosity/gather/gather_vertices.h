@@ -36,7 +36,7 @@ class VertexGather {
   const Surfaces& surfaces_;
   const VertexGroups& groups_;
   LightEstimate estimate_;
-  std::vector<Receiver::Parts> parts_;  ///< [groups]
+  std::vector<Receiver::Parts> parts_, parts_behind_;  ///< [groups]
   std::vector<std::uint8_t> is_known_;
   ReplicateSpread spread_;
 };

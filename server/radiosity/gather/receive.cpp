@@ -283,12 +283,13 @@ void replace_unseen_sites(const GatherScene& scene, std::span<const Site> known,
   }
 }
 
-Reception receive(const GatherScene& scene, Receiver& receiver, std::uint64_t rays_seed, std::uint64_t light_seed,
-                  ReceiveScratch& scratch, int light_samples) {
+namespace {
+
+Reception receive_one_side(const GatherScene& scene, Receiver& receiver, Seeds seeds, int light_samples,
+                           ReceiveScratch& scratch) {
   const auto is_one_part = [&](std::span<const Site> sites) {
     return find_parts(scene.surfaces, scene.visibility, sites, scratch.parting).size() == 1;
   };
-  const Seeds seeds{rays_seed, light_seed};
   if (receiver.parts == Receiver::Parts::kUnknown) {
     place_fixed(receiver, kFirstLook, scratch.places);
     receiver.parts = is_one_part(scratch.places) ? Receiver::Parts::kOne : Receiver::Parts::kSeveral;
@@ -299,6 +300,68 @@ Reception receive(const GatherScene& scene, Receiver& receiver, std::uint64_t ra
   }
   if (receiver.parts == Receiver::Parts::kOne) return receive_part(scene, 1, seeds, light_samples, scratch);
   return receive_darkest_part(scene, receiver, seeds, light_samples, scratch);
+}
+
+Site turned(const Site& site) { return {site.point, site.position, -site.facing, -site.normal}; }
+
+/// Of what arrives on either side, the share that counts for the front.
+struct SideShares {
+  Vec3 front, behind;
+};
+SideShares shares_of(const Surfaces& surfaces, std::span<const Site> sites) {
+  Vec3 reflectance, through;
+  for (const Site& site : sites) {
+    reflectance += surfaces.reflectance(site.point);
+    through += surfaces.diffuse_transmittance(site.point);
+  }
+  SideShares shares;
+  for (int c = 0; c < 3; ++c) {
+    const double both = reflectance[c] + through[c];
+    shares.front[c] = both > 0 ? reflectance[c] / both : 0.5;
+    shares.behind[c] = 1 - shares.front[c];
+  }
+  return shares;
+}
+
+void scale(Vec3 share, ReceivedLight& light) {
+  for (Vec3* part : {&light.gathered, &light.direct, &light.reflected, &light.coarser}) *part = scaled_by(*part, share);
+}
+
+}  // namespace
+
+Reception receive(const GatherScene& scene, Receiver& receiver, std::uint64_t rays_seed, std::uint64_t light_seed,
+                  ReceiveScratch& scratch, int light_samples) {
+  const bool is_translucent = scene.surfaces.is_translucent(scratch.sites.front().point.triangle);
+  const std::vector<Site> sites = is_translucent ? scratch.sites : std::vector<Site>();
+  Reception front = receive_one_side(scene, receiver, {rays_seed, light_seed}, light_samples, scratch);
+  if (!is_translucent) return front;
+
+  // The same places, turned.
+  constexpr std::uint64_t kBehind = 1;
+  Receiver other{mixed_bits(receiver.id + kBehind), [&](double u, double v) { return turned(receiver.site_at(u, v)); },
+                 receiver.parts_behind};
+  scratch.sites.clear();
+  for (const Site& site : sites) scratch.sites.push_back(turned(site));
+  const Seeds seeds{mixed_bits(rays_seed + kBehind), mixed_bits(light_seed + kBehind)};
+  const Reception behind = receive_one_side(scene, other, seeds, light_samples, scratch);
+  receiver.parts_behind = other.parts;
+
+  // A side that is buried gets nothing.
+  const SideShares shares = shares_of(scene.surfaces, sites);
+  Reception out = front;
+  out.rays += behind.rays;
+  out.light_rays += behind.light_rays;
+  out.is_buried = front.is_buried && behind.is_buried;
+  out.visible_share = std::max(front.visible_share, behind.visible_share);
+  if (front.is_buried) out.openness = behind.openness;
+  for (std::size_t r = 0; r < static_cast<std::size_t>(scene.rows.replicates()); ++r) {
+    ReceivedLight own = front.replicates[r], through = behind.replicates[r];
+    scale(front.is_buried ? Vec3{} : shares.front, own);
+    scale(behind.is_buried ? Vec3{} : shares.behind, through);
+    out.replicates[r] = {own.gathered + through.gathered, own.direct + through.direct,
+                         own.reflected + through.reflected, own.coarser + through.coarser};
+  }
+  return out;
 }
 
 }  // namespace radbake::radiosity

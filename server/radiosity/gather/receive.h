@@ -79,6 +79,7 @@ struct Receiver {
   /// The place at (u, v) of the unit square, spread over the receiver by area.
   std::function<Site(double u, double v)> site_at;
   Parts parts = Parts::kUnknown;  ///< receive() finds out
+  Parts parts_behind = Parts::kUnknown;
 };
 
 /// Gathers the light at scratch.sites, which are spread over one receiver; each replicate has its share of them, in
@@ -93,6 +94,12 @@ struct Receiver {
 /// the darkest part of it counts (of those of an eighth at least): a receiver that showed the light of the other side
 /// of a wall, or a mean of both, would be a leak. Its parts are those of places that are the same in every pass: found
 /// anew by the sites of each, a part near an eighth would come and go, and no spread of replicates would tell.
+/// What light goes through scattered (a leaf, a curtain) receives on both sides, and its light is the mean of both,
+/// weighted by what it sends on of each: a surface that reflected rho + tau of that light would send what this one
+/// sends.
+///
+///   (rho H + tau H_opp) / (rho + tau)
+///
 /// `rays_seed`, `light_seed`: what this pass of the receiver is.
 /// `light_samples`: shadow rays to emitters, of all replicates; 0: as many as scene.direct has.
 Reception receive(const GatherScene& scene, Receiver& receiver, std::uint64_t rays_seed, std::uint64_t light_seed,

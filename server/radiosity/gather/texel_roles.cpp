@@ -120,7 +120,8 @@ bool TexelRoles::looks_plain(int i, int j, Footprint& footprint, std::vector<Ray
   Vec3 normal;
   const auto take = [&](int dx, int dy) {
     const auto point = middle(left + dx, top + dy, footprint);
-    if (!point) return false;
+    // What receives on both sides gathers alone.
+    if (!point || surfaces_.is_translucent(point->triangle)) return false;
     positions[at(dx, dy)] = surfaces_.position(*point);
     triangles[at(dx, dy)] = point->triangle;
     const Vec3 own = surfaces_.shading_normal(*point);

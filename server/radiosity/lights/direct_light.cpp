@@ -87,16 +87,24 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
       const double inner = std::cos(spot->inner_cone_radians), outer = std::cos(spot->outer_cone_radians);
       lamps_.push_back({in_scene(spot->position), spot->intensity, spot->direction, true, outer,
                         1 / std::max(0.001, inner - outer)});
+    } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
+      lamps_.push_back({in_scene(luminaire->position), luminaire->tint, luminaire->direction, false, 0, 0,
+                        &luminaire->profile, luminaire->zero_side});
     } else {
       suns_.push_back(std::get<DirectionalLight>(light.kind));
     }
   }
 }
 
-/// Share of a spot's intensity at an angle to its axis. Source: KHR_lights_punctual, inner and outer cone angles.
-double DirectLight::Lamp::falloff(double cosine) const {
+Vec3 DirectLight::Lamp::intensity_towards(Vec3 direction) const {
+  const double cosine = dot(direction, axis);
+  if (profile != nullptr) {
+    return intensity * profile->intensity(cosine, dot(direction, zero_side), dot(direction, cross(zero_side, axis)));
+  }
+  if (!is_spot) return intensity;
+  // Source: KHR_lights_punctual, inner and outer cone angles.
   const double linear = std::clamp((cosine - outer_cosine) * per_ramp, 0.0, 1.0);
-  return linear * linear;
+  return intensity * (linear * linear);
 }
 
 Vec3 DirectLight::sent_by(std::uint32_t triangle) const {
@@ -129,6 +137,8 @@ double DirectLight::emitted_lumens() const {
       lumens += 4 * std::numbers::pi * mean_component(point->intensity);
     } else if (const auto* spot = std::get_if<SpotLight>(&light.kind)) {
       lumens += spot_lumens(*spot);
+    } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
+      lumens += luminaire->profile.lumens() * mean_component(luminaire->tint);
     }
   }
   return lumens;
@@ -316,8 +326,7 @@ void DirectLight::sample_lamps(std::span<const Site> sites, Scratch& scratch, st
         if (distance <= 0) continue;
         const Vec3 unit = direction / distance;
         const double metres = distance * surfaces_.metres_per_unit;
-        const Vec3 intensity = lamp.is_spot ? lamp.intensity * lamp.falloff(dot(-unit, lamp.axis)) : lamp.intensity;
-        const Vec3 contribution = intensity * (receiving_cosine(site, unit) / (metres * metres));
+        const Vec3 contribution = lamp.intensity_towards(-unit) * (receiving_cosine(site, unit) / (metres * metres));
         if (max_component(contribution) <= 0) continue;
         // Aim from the lifted origin at the lamp itself.
         const Vec3 lift = site.facing * surfaces_.ray_offsets[site.point.triangle];

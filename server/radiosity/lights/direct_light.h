@@ -23,8 +23,8 @@ namespace radbake::radiosity {
 ///
 ///   H = E/pi cos(theta) Omega V            H = E/pi cos(theta) cos(theta') A / r^2 V
 ///
-/// Lamps: one shadow ray from each site. H = I cos(theta) / r^2 (point, spot), H = E_sun cos(theta) (directional).
-/// Suns with a disc of half-angle alpha: directions in the disc by the cosine to its middle, density
+/// Lamps: one shadow ray from each site. H = I cos(theta) / r^2 (point, spot, luminaire), H = E_sun cos(theta)
+/// (directional). Suns with a disc of half-angle alpha: directions in the disc by the cosine to its middle, density
 /// cos(gamma) / (pi sin^2 alpha), H = E_sun cos(theta) / cos(gamma) V. Skies of every direction: Environment.
 /// About an interpolated normal, the part of the cosine lobe under the surface, (1 - n.g)/2, is taken out and the rest
 /// scaled up, as the hemisphere rows do.
@@ -70,14 +70,17 @@ class DirectLight {
   double emitted_lumens() const;
 
  private:
-  /// A point or spot light.
+  /// A point or spot light, or a luminaire.
   struct Lamp {
     Vec3 position;   ///< scene units
-    Vec3 intensity;  ///< cd
+    Vec3 intensity;  ///< cd; of a luminaire its tint
     Vec3 axis;
     bool is_spot = false;
     double outer_cosine = 0, per_ramp = 0;  ///< of a spot
-    double falloff(double cosine) const;
+    const LightProfile* profile = nullptr;  ///< of a luminaire
+    Vec3 zero_side = {};
+    /// In a direction away from it, unit length, cd.
+    Vec3 intensity_towards(Vec3 direction) const;
   };
 
   /// Mean exitance of an emitter triangle with its holes.

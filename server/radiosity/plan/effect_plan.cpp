@@ -9,8 +9,8 @@
 namespace radbake::radiosity {
 namespace {
 
-constexpr std::array kLightEffects = {Effect::kEmitters, Effect::kPoint, Effect::kSpot, Effect::kDirectional,
-                                      Effect::kSun,      Effect::kSky,   Effect::kHdri};
+constexpr std::array kLightEffects = {Effect::kEmitters,    Effect::kPoint, Effect::kSpot, Effect::kIes,
+                                      Effect::kDirectional, Effect::kSun,   Effect::kSky,  Effect::kHdri};
 
 std::string number(double value) {
   std::ostringstream text;
@@ -41,11 +41,13 @@ class EffectPlanner {
   Result<std::vector<EffectPlan>> plan() {
     decide(Effect::kAlphaMask, alpha_mask());
     decide(Effect::kTint, tint());
+    decide(Effect::kDiffuseTransmission, diffuse_transmission());
     // Light from outside enters where there is an opening, a hole or a sheet.
     is_sealed_ = survey_.is_closed && !is_on(Effect::kAlphaMask) && !is_on(Effect::kTint);
     decide(Effect::kEmitters, emitters());
     decide(Effect::kPoint, light(survey_.point, "point light"));
     decide(Effect::kSpot, light(survey_.spot, "spot light"));
+    decide(Effect::kIes, light(survey_.ies, "luminaire with measured intensities"));
     decide(Effect::kDirectional, light(survey_.directional, "directional light"));
     decide(Effect::kSun, sun());
     decide(Effect::kSky, sky());
@@ -111,6 +113,12 @@ class EffectPlanner {
               survey_.area_tinted_m2 / survey_.area_m2);
   }
 
+  Decision diffuse_transmission() const {
+    if (survey_.area_translucent_m2 <= 0) return absent("no material lets light through scattered");
+    return on("light goes scattered through " + area(survey_.area_translucent_m2),
+              survey_.area_translucent_m2 / survey_.area_m2);
+  }
+
   Decision emitters() const {
     const std::uint64_t num = survey_.num_emissive_materials;
     if (num == 0) return absent("no material emits");
@@ -169,8 +177,8 @@ class EffectPlanner {
       return !is_on(effect) || facts.num_outside == 0;
     };
     if (survey_.is_convex && !is_on(Effect::kHdri) && is_inside(Effect::kPoint, survey_.point) &&
-        is_inside(Effect::kSpot, survey_.spot) && is_inside(Effect::kDirectional, survey_.directional) &&
-        is_inside(Effect::kSun, survey_.sun)) {
+        is_inside(Effect::kSpot, survey_.spot) && is_inside(Effect::kIes, survey_.ies) &&
+        is_inside(Effect::kDirectional, survey_.directional) && is_inside(Effect::kSun, survey_.sun)) {
       return off("convex: " + counted(survey_.num_triangles, "triangle") + " see all of each other and of the lights",
                  triangles);
     }

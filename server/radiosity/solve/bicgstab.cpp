@@ -16,7 +16,7 @@ C quotient(C a, C b) {
   return by_channel(a, b, [](double x, double y) { return y != 0 && std::isfinite(x / y) ? x / y : 0; });
 }
 
-/// Stabilised bi-conjugate gradients on (I - rho F) B' = source, channels side by side.
+/// Stabilised bi-conjugate gradients on (I - M F) B' = source, channels side by side.
 template <Channels C>
 class BiconjugateGradients {
  public:
@@ -27,6 +27,7 @@ class BiconjugateGradients {
         direction_(residual_),
         applied_(residual_.size()),
         stabiliser_(residual_.size()),
+        gathered_(residual_.size()),
         reach_(inner(shadow_, residual_)) {}
 
   /// One step. Returns max|r| as it is carried along; infinity where it was cancelled.
@@ -59,11 +60,11 @@ class BiconjugateGradients {
   }
 
  private:
-  /// (I - rho F) values
+  /// (I - M F) values
   bool apply(const std::vector<C>& values, std::vector<C>& applied) {
-    if (!monitor_.gather(values, applied)) return false;
+    if (!monitor_.gather(values, gathered_)) return false;
     for (std::size_t i = 0; i < values.size(); ++i) {
-      applied[i] = values[i] - scaled_by(monitor_.problem().reflectance[i], applied[i]);
+      applied[i] = values[i] - monitor_.problem().passed_on(i, gathered_);
     }
     return true;
   }
@@ -74,7 +75,7 @@ class BiconjugateGradients {
   }
 
   SolveMonitor<C>& monitor_;
-  std::vector<C> residual_, shadow_, direction_, applied_, stabiliser_;
+  std::vector<C> residual_, shadow_, direction_, applied_, stabiliser_, gathered_;
   C reach_{};
 };
 

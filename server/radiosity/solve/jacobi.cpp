@@ -6,9 +6,9 @@ template <Channels C>
 void solve_by_jacobi(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   const ProblemOf<C>& problem = monitor.problem();
   while (monitor.goes_on(radiosity)) {
-    // B'_i <- source_i + rho_i sum_j F_ij B'_j, all with the old values, which the look has gathered already.
+    // B'_i <- source_i + (M F B')_i, all with the old values, which the look has gathered already.
     for (std::size_t i = 0; i < radiosity.size(); ++i) {
-      radiosity[i] = problem.source[i] + scaled_by(problem.reflectance[i], monitor.irradiance()[i]);
+      radiosity[i] = problem.source[i] + problem.passed_on(i, monitor.irradiance());
     }
     monitor.add_steps(1, 0);
   }

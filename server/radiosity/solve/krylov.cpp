@@ -112,7 +112,8 @@ void run_cycles(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
 
 template <Channels C>
 void solve_by_krylov(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
-  if (monitor.transport().is_reciprocal()) {
+  // With light that is let through, the matrix is self-adjoint in no inner product that weighs by rho.
+  if (monitor.transport().is_reciprocal() && !monitor.problem().transmits()) {
     run_cycles(monitor, radiosity);
   } else {
     solve_by_bicgstab(monitor, radiosity);

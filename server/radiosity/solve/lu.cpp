@@ -1,11 +1,12 @@
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "server/radiosity/solve/solve_monitor.h"
 
 namespace radbake::radiosity {
 namespace {
 
-/// I - rho F of one channel.
+/// I - M F of one channel.
 template <Channels C>
 Eigen::MatrixXd matrix_of(const TransportOperator& transport, const ProblemOf<C>& problem, int c) {
   const auto n = static_cast<Eigen::Index>(transport.size());
@@ -16,17 +17,21 @@ Eigen::MatrixXd matrix_of(const TransportOperator& transport, const ProblemOf<C>
     transport.row(i, patches, form_factors);
     for (std::size_t k = 0; k < patches.size(); ++k) {
       matrix(i, patches[k]) -= channel(problem.reflectance[i], c) * form_factors[k];
+      if (problem.transmits()) {
+        // What arrives at i leaves on the other side, too.
+        const std::uint32_t other = problem.other_side[i];
+        matrix(other, patches[k]) -= channel(problem.transmittance[other], c) * form_factors[k];
+      }
     }
   }
   return matrix;
 }
 
 template <Channels C>
-bool have_equal_reflectance(const ProblemOf<C>& problem, int a, int b) {
-  for (const C& rho : problem.reflectance) {
-    if (channel(rho, a) != channel(rho, b)) return false;
-  }
-  return true;
+bool pass_on_equally(const ProblemOf<C>& problem, int a, int b) {
+  const auto are_equal = [&](const C& share) { return channel(share, a) == channel(share, b); };
+  return std::all_of(problem.reflectance.begin(), problem.reflectance.end(), are_equal) &&
+         std::all_of(problem.transmittance.begin(), problem.transmittance.end(), are_equal);
 }
 
 }  // namespace
@@ -38,12 +43,12 @@ void solve_by_lu(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   const ProblemOf<C>& problem = monitor.problem();
   const auto n = static_cast<Eigen::Index>(radiosity.size());
 
-  // P L U = I - rho F, once for channels of equal reflectance.
+  // P L U = I - M F, once for channels of equal shares.
   std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>> factors;
   int factors_of[kNumChannels<C>];
   for (int c = 0; c < kNumChannels<C>; ++c) {
     int equal = 0;
-    while (equal < c && !have_equal_reflectance(problem, equal, c)) ++equal;
+    while (equal < c && !pass_on_equally(problem, equal, c)) ++equal;
     if (equal < c) {
       factors_of[c] = factors_of[equal];
       continue;
@@ -52,7 +57,7 @@ void solve_by_lu(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
     factors.emplace_back(matrix_of(transport, problem, c));
     monitor.add_steps(0, n);
   }
-  // B' <- B' + (I - rho F)^-1 r: the first from the guess, then refinements while they gain by half.
+  // B' <- B' + (I - M F)^-1 r: the first from the guess, then refinements while they gain by half.
   double best = std::numeric_limits<double>::infinity();
   Eigen::VectorXd right(n);
   do {

@@ -38,6 +38,7 @@ void solve_by_shooting(SolveMonitor<C>& monitor, std::vector<C>& radiosity, std:
   const std::vector<double> weights = weights_of(transport.areas());
   std::optional<LargestKey> largest;
   std::vector<std::uint32_t> patches(n);
+  std::vector<std::uint32_t> others;
   std::vector<double> form_factors, keys(n);
   double flux = 0;
 
@@ -67,24 +68,37 @@ void solve_by_shooting(SolveMonitor<C>& monitor, std::vector<C>& radiosity, std:
         is_unshot_known = false;
         break;
       }
-      // Shoot from i: B_j += rho_j F_ji dB_i and dB_j += the same, for all j.
+      // Shoot from i: B_j += (M F)_ji dB_i and dB_j += the same, for all j.
       const C shot = unshot[i];
       constexpr double kNone = 0;
       unshot[i] = {};
       largest->set(std::span(&i, 1), std::span(&kNone, 1));
       transport.column(i, patches, form_factors);
-      keys.resize(patches.size());
-      for (std::size_t k = 0; k < patches.size(); ++k) {
-        const std::uint32_t j = patches[k];
-        const C received = scaled_by(problem.reflectance[j], shot * form_factors[k]);
+      const auto receive = [&](std::uint32_t j, C received) {
         radiosity[j] += received;
         unshot[j] += received;
         flux += transport.areas()[j] * mean_of_channels(received);
-        keys[k] = unshot_flux(weights[j], unshot[j]);
+        keys.push_back(unshot_flux(weights[j], unshot[j]));
+      };
+      keys.clear();
+      for (std::size_t k = 0; k < patches.size(); ++k) {
+        const std::uint32_t j = patches[k];
+        receive(j, scaled_by(problem.reflectance[j], shot * form_factors[k]));
       }
       largest->set(patches, keys);
+      if (problem.transmits()) {
+        keys.clear();
+        others.clear();
+        for (std::size_t k = 0; k < patches.size(); ++k) {
+          const std::uint32_t j = problem.other_side[patches[k]];
+          if (max_component(problem.transmittance[j]) == 0) continue;
+          receive(j, scaled_by(problem.transmittance[j], shot * form_factors[k]));
+          others.push_back(j);
+        }
+        largest->set(others, keys);
+      }
       monitor.add_steps(1, 1);
-      // r = rho F dB: its size is at most (1 - margin) that of dB.
+      // r = M F dB: its size is at most (1 - margin) that of dB.
       if (steps % steps_per_check == 0 &&
           !monitor.needs_no_look((1 - monitor.margin()) * monitor.size_of(unshot), flux, radiosity, unshot)) {
         is_unshot_known = false;

@@ -86,7 +86,8 @@ Result<SolveReport> solve(Solver solver, const TransportOperator& transport, con
 Result<SolveReport> solve_grey(Solver solver, const TransportOperator& transport, const RadiosityProblem& problem,
                                const SolveOptions& options, std::vector<Vec3>& radiosity,
                                const GreySolveObserver& observe, std::stop_token stop) {
-  const GreyProblem grey{means_of(problem.source), means_of(problem.reflectance)};
+  const GreyProblem grey{means_of(problem.source), means_of(problem.reflectance), means_of(problem.transmittance),
+                         problem.other_side};
   std::vector<double> values = means_of(radiosity);
   RADBAKE_ASSIGN_OR_RETURN(SolveReport report,
                            solve(solver, transport, grey, options, values, observe, std::move(stop)));

@@ -14,11 +14,23 @@
 
 namespace radbake::radiosity {
 
-/// B' = source + rho (F B'): source = E_in + rho H^direct. Shapes: both [n]; channels are solved side by side.
+/// B' = source + M (F B'), M H = rho_i H_i + tau_i H_opp(i): source = E_in + M H^direct. Channels are solved side by
+/// side. Where nothing lets light through diffusely, `transmittance` and `other_side` are empty, and M is rho.
+/// Shapes: all [n], or empty.
 template <Channels C>
 struct ProblemOf {
   std::vector<C> source;       ///< each channel >= 0
   std::vector<C> reflectance;  ///< each channel in [0, 1)
+  std::vector<C> transmittance = {};           ///< tau_i, of what arrives on the other side; rho_i + tau_i < 1
+  std::vector<std::uint32_t> other_side = {};  ///< opp(i); i itself where there is none, and tau_i is 0 then
+
+  bool transmits() const { return !transmittance.empty(); }
+  /// (M H)_i
+  C passed_on(std::size_t i, std::span<const C> irradiance) const {
+    C out = scaled_by(reflectance[i], irradiance[i]);
+    if (transmits()) out += scaled_by(transmittance[i], irradiance[other_side[i]]);
+    return out;
+  }
 };
 using RadiosityProblem = ProblemOf<Vec3>;
 using GreyProblem = ProblemOf<double>;
@@ -74,7 +86,7 @@ struct SolveStep {
   std::int64_t steps = 0;
   std::int64_t work = 0;  ///< rows and columns read so far, those read for residuals included
   double seconds = 0;
-  /// max |r| over patches and channels, r = source - (I - rho F) B'. Southwell, shooting and krylov carry it along
+  /// max |r| over patches and channels, r = source - (I - M F) B'. Southwell, shooting and krylov carry it along
   /// between full looks (shooting: a bound on it).
   double residual = std::numeric_limits<double>::infinity();
   double error_bound = std::numeric_limits<double>::infinity();           ///< max |B' - exact| is at most this
@@ -115,10 +127,10 @@ using GreySolveObserver = SolveObserverOf<double>;
 ///
 /// Stops on the bound, never on the size of a step:
 ///
-///   max|B' - exact| <= (max|r| + rounding) / (1 - max_i rho_i (F1)_i)
+///   max|B' - exact| <= (max|r| + rounding) / (1 - max_i (M F 1)_i)
 ///
 /// Of an operator that is known by columns (Southwell and shooting only, checked) |.| is the mean by area instead of
-/// the largest, and the divisor 1 - max_j sum_i A_i rho_i F_ij / A_j: light that is sent on.
+/// the largest, and the divisor 1 - max_j sum_i A_i (M F)_ij / A_j: light that is sent on.
 ///
 /// Southwell and shooting read columns, the others rows. Every sum runs in a fixed order: equal bits for any number of
 /// threads. The clock decides only where a time budget ends a solve.

@@ -44,6 +44,8 @@ SolveMonitor<C>::SolveMonitor(Solver solver, const TransportOperator& transport,
       irradiance_(transport.size()) {
   RADBAKE_CHECK_EQ(problem.source.size(), transport.size());
   RADBAKE_CHECK_EQ(problem.reflectance.size(), transport.size());
+  RADBAKE_CHECK_EQ(problem.transmittance.size(), problem.transmits() ? transport.size() : 0);
+  RADBAKE_CHECK_EQ(problem.other_side.size(), problem.transmittance.size());
   report_.solver = solver;
   if (reads_columns(solver)) max_steps_ *= static_cast<std::int64_t>(transport.size());
   for (const double area : transport.areas()) area_ += area;
@@ -54,7 +56,9 @@ template <Channels C>
 double SolveMonitor<C>::largest_share_passed_on() const {
   double passed_on = 0;
   for (std::uint32_t i = 0; i < size(); ++i) {
-    passed_on = std::max(passed_on, max_component(problem_.reflectance[i]) * transport_.row_sum(i));
+    C share = problem_.reflectance[i] * transport_.row_sum(i);
+    if (problem_.transmits()) share += problem_.transmittance[i] * transport_.row_sum(problem_.other_side[i]);
+    passed_on = std::max(passed_on, max_component(share));
   }
   return passed_on;
 }
@@ -69,7 +73,12 @@ double SolveMonitor<C>::largest_share_sent_on() {
     for (std::size_t j = begin; j < end && !is_cancelled(); ++j) {
       transport_.column(static_cast<std::uint32_t>(j), patches, form_factors);
       for (std::size_t k = 0; k < patches.size(); ++k) {
-        sent_on[j] += areas[patches[k]] * max_component(problem_.reflectance[patches[k]]) * form_factors[k];
+        const std::uint32_t i = patches[k];
+        sent_on[j] += areas[i] * max_component(problem_.reflectance[i]) * form_factors[k];
+        if (problem_.transmits()) {
+          const std::uint32_t other = problem_.other_side[i];
+          sent_on[j] += areas[other] * max_component(problem_.transmittance[other]) * form_factors[k];
+        }
       }
       if (areas[j] > 0) sent_on[j] /= areas[j];
     }
@@ -101,22 +110,27 @@ template <Channels C>
 bool SolveMonitor<C>::look(std::span<const C> radiosity) {
   RADBAKE_CHECK_EQ(radiosity.size(), size());
   const bool is_by_columns = transport_.is_by_columns();
-  if (is_by_columns) transport_.gather(radiosity, irradiance_);
+  if (is_by_columns) {
+    transport_.gather(radiosity, irradiance_);
+  } else if (!gather(radiosity, irradiance_)) {
+    return false;
+  }
   for_each_range(size(), transport_.rows_per_task(), [&](std::size_t begin, std::size_t end) {
     if (stop_.stop_requested()) return;
     for (std::size_t i = begin; i < end; ++i) {
       const auto patch = static_cast<std::uint32_t>(i);
-      // r = source + rho F B' - B', and a bound on its own rounding: (n + 4) u times the sum of magnitudes.
-      if (!is_by_columns) irradiance_[i] = transport_.gather_at(patch, radiosity);
-      const C reflected = scaled_by(problem_.reflectance[i], irradiance_[i]);
-      residuals_[i] = problem_.source[i] + reflected - radiosity[i];
-      const C magnitude = problem_.source[i] + reflected + radiosity[i];
-      const double roundings = static_cast<double>(transport_.row_length(patch)) + 4;
+      // r = source + M F B' - B', and a bound on its own rounding: (n + 4) u times the sum of magnitudes.
+      const C passed_on = problem_.passed_on(i, irradiance_);
+      residuals_[i] = problem_.source[i] + passed_on - radiosity[i];
+      const C magnitude = problem_.source[i] + passed_on + radiosity[i];
+      std::size_t length = transport_.row_length(patch);
+      if (problem_.transmits()) length = std::max(length, transport_.row_length(problem_.other_side[i])) + 2;
+      const double roundings = static_cast<double>(length) + 4;
       terms_[i] = {largest_component(residuals_[i]), roundings * kRoundoff * max_component(magnitude)};
     }
   });
   if (stop_.stop_requested()) return false;
-  report_.work += static_cast<std::int64_t>(size());
+  if (is_by_columns) report_.work += static_cast<std::int64_t>(size());
 
   const auto areas = transport_.areas();
   report_.residual = rounding_ = flux_ = 0;
@@ -221,10 +235,10 @@ void SolveMonitor<C>::sharpen_bound() {
   double rounding = rounding_, magnitudes = report_.residual;
   constexpr int kMaxTerms = 50;
   for (int k = 1; k <= kMaxTerms; ++k) {
-    // (rho F)^k r, and the rounding that it adds.
+    // (M F)^k r, and the rounding that it adds.
     rounding += (static_cast<double>(longest_row) + 4) * kRoundoff * largest_of(term);
     if (!gather(term, irradiance_)) break;
-    for (std::size_t i = 0; i < size(); ++i) term[i] = scaled_by(problem_.reflectance[i], irradiance_[i]);
+    for (std::size_t i = 0; i < size(); ++i) term[i] = problem_.passed_on(i, irradiance_);
     const double rest = (largest_of(term) + rounding) / margin_, known = largest_of(sum);
     const double sharp = known + k * kRoundoff * magnitudes + rest;
     if (sharp < report_.error_bound) {

@@ -49,18 +49,18 @@ class SolveMonitor {
   /// Ends a solve that no step changes any more, or that was cancelled within one.
   void end_without_progress();
 
-  /// Of the last look: r = source + rho F B - B, and F B.
+  /// Of the last look: r = source + M F B - B, and F B.
   std::span<const C> residuals() const { return residuals_; }
   std::span<const C> irradiance() const { return irradiance_; }
   double flux() const { return flux_; }
   double relative_error_bound() const { return report_.relative_error_bound; }
   std::int64_t steps() const { return report_.steps; }
-  /// 1 - max_i rho_i (F1)_i; of operators known by columns 1 - max_j sum_i A_i rho_i F_ij / A_j
+  /// 1 - max_i (M F 1)_i; of operators known by columns 1 - max_j sum_i A_i (M F)_ij / A_j
   double margin() const { return margin_; }
 
-  /// Sharpens the bound of the last look: (I - rho F)^-1 = sum_m (rho F)^m, its first k terms summed with their signs,
+  /// Sharpens the bound of the last look: (I - M F)^-1 = sum_m (M F)^m, its first k terms summed with their signs,
   ///
-  ///   max|B' - exact| <= max|sum_(m<k) (rho F)^m r| + (max|(rho F)^k r| + rounding) / (1 - max_i rho_i (F1)_i)
+  ///   max|B' - exact| <= max|sum_(m<k) (M F)^m r| + (max|(M F)^k r| + rounding) / (1 - max_i (M F 1)_i)
   ///
   /// until the rest is half of the sum: then the bound is at most 3 x the error. Wanted where residuals change sign
   /// from patch to patch, as those of Krylov methods do: the plain bound is then up to 1/(1 - rho) too large.

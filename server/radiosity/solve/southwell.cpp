@@ -21,6 +21,7 @@ void solve_by_southwell(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
   const std::size_t n = radiosity.size();
   std::optional<LargestKey> largest;
   std::vector<std::uint32_t> patches(n);
+  std::vector<std::uint32_t> others;
   std::vector<double> form_factors, keys(n);
   std::vector<C> residuals;
 
@@ -44,10 +45,16 @@ void solve_by_southwell(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
       const auto own = std::lower_bound(patches.begin(), patches.end(), i);
       const double own_factor = own != patches.end() && *own == i ? form_factors[own - patches.begin()] : 0;
 
-      // Make equation i hold: dB_i = r_i / (1 - rho_i F_ii), and r_j += rho_j F_ji dB_i for all others.
-      const C rho = problem.reflectance[i], r = residuals[i];
-      const C change =
-          by_channel(r, rho, [&](double residual, double own_rho) { return residual / (1 - own_rho * own_factor); });
+      // Make equation i hold: dB_i = r_i / (1 - (M F)_ii), and r_j += (M F)_ji dB_i for all others.
+      C own_share = problem.reflectance[i] * own_factor;
+      if (problem.transmits()) {
+        const auto other = std::lower_bound(patches.begin(), patches.end(), problem.other_side[i]);
+        if (other != patches.end() && *other == problem.other_side[i]) {
+          own_share += problem.transmittance[i] * form_factors[other - patches.begin()];
+        }
+      }
+      const C r = residuals[i];
+      const C change = by_channel(r, own_share, [](double residual, double share) { return residual / (1 - share); });
       radiosity[i] += change;
       flux += transport.areas()[i] * mean_of_channels(change);
       keys.resize(patches.size());
@@ -57,7 +64,19 @@ void solve_by_southwell(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
         keys[k] = largest_component(residuals[j]);
       }
       largest->set(patches, keys);
-      if (own_factor == 0) {
+      if (problem.transmits()) {
+        others.clear();
+        keys.clear();
+        for (std::size_t k = 0; k < patches.size(); ++k) {
+          const std::uint32_t j = problem.other_side[patches[k]];
+          if (j == i || max_component(problem.transmittance[j]) == 0) continue;
+          residuals[j] += scaled_by(problem.transmittance[j], change * form_factors[k]);
+          others.push_back(j);
+          keys.push_back(largest_component(residuals[j]));
+        }
+        largest->set(others, keys);
+      }
+      if (max_component(own_share) == 0) {
         // The patch does not see itself, so its column may leave it out.
         constexpr double kNone = 0;
         residuals[i] = {};

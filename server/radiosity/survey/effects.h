@@ -13,6 +13,7 @@ enum class Effect {
   kEmitters,             ///< surfaces that emit
   kPoint,                ///< point lights
   kSpot,                 ///< spot lights
+  kIes,                  ///< luminaires of measured intensities
   kDirectional,          ///< parallel light
   kSun,                  ///< light from a disc in the sky: soft shadows
   kSky,                  ///< a sky of one luminance
@@ -24,6 +25,7 @@ enum class Effect {
   kTexturedEmission,     ///< off: the mean of each triangle
   kAlphaMask,            ///< holes and partial coverage; off: opaque
   kTint,                 ///< sheets that light passes straight through; off: opaque
+  kDiffuseTransmission,  ///< leaves, curtains: light that goes through scattered; off: they only reflect
   kTwoSided,             ///< backs reflect; off: they absorb
   kVertices,             ///< output: light by vertex
   kLayers,               ///< output: direct and indirect light apart
@@ -33,7 +35,7 @@ enum class Effect {
   kNormalMap,            ///< not simulated in the lightmap
   kVolume,               ///< not simulated: absorption and scattering inside
 };
-inline constexpr int kNumEffects = 22;
+inline constexpr int kNumEffects = 24;
 
 /// The ids that users see, in the order of Effect.
 using radbake::kEffectNames;

@@ -100,6 +100,11 @@ void find_light_facts(const Surfaces& surfaces, const ScenePlanes& planes, Surve
       add(spot->intensity, place_of_lamp(surfaces, planes, spot->position), survey.spot);
       survey.lamp_lumens += spot_lumens(*spot);
       survey.is_grey &= is_grey(spot->intensity);
+    } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
+      const double lumens = luminaire->profile.lumens();
+      add(luminaire->tint * lumens, place_of_lamp(surfaces, planes, luminaire->position), survey.ies);
+      survey.lamp_lumens += lumens * mean_component(luminaire->tint);
+      survey.is_grey &= is_grey(luminaire->tint);
     } else if (const auto* sun = std::get_if<DirectionalLight>(&light.kind)) {
       const bool is_disc = sun->angular_diameter_radians > 0;
       add(sun->illuminance, place_of_sun(surfaces, planes, *sun), is_disc ? survey.sun : survey.directional);

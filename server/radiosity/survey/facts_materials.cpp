@@ -92,6 +92,8 @@ class MaterialFacts {
       ++survey_.varying_reflectance.num;
       survey_.varying_reflectance.num_flat += is_flat_by_triangle;
     }
+    // What is sent on in all.
+    high += scaled_by(material.diffuse_transmittance, range_of_use(material.diffuse_transmittance_texture).high);
     survey_.min_reflectance = std::min(survey_.min_reflectance, min_component(low));
     survey_.max_reflectance = std::max(survey_.max_reflectance, max_component(high));
   }
@@ -113,6 +115,8 @@ class MaterialFacts {
     add_use(material.reflectance + material.transmittance, material.reflectance_texture, survey_.varying_reflectance,
             reflectance_textures_);
     survey_.is_grey &= is_grey(material.reflectance) && is_grey(material.transmittance);
+    add_use(material.diffuse_transmittance, material.diffuse_transmittance_texture, survey_.varying_reflectance,
+            reflectance_textures_);
     add_use(material.emissive, material.emissive_texture, survey_.varying_emission, emission_textures_);
     survey_.num_emissive_materials += max_component(material.emissive) > 0;
     survey_.num_emissive_dark +=
@@ -143,6 +147,7 @@ void find_material_facts(const Surfaces& surfaces, Survey& survey) {
     const double area = surfaces.areas[t] * square_metres;
     survey.area_masked_m2 += passes[static_cast<std::size_t>(index)] ? area : 0;
     survey.area_tinted_m2 += max_component(material.transmittance) > 0 ? area : 0;
+    survey.area_translucent_m2 += max_component(material.diffuse_transmittance) > 0 ? area : 0;
     survey.area_double_sided_m2 += material.is_double_sided ? area : 0;
     survey.area_specular_m2 += material.is_specular ? area : 0;
     survey.area_refractive_m2 += material.is_refractive ? area : 0;

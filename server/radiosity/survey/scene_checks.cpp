@@ -57,7 +57,8 @@ Result<void> check_mesh(const Scene& scene, std::size_t m) {
   }
   // A textured material needs the coordinates that it names.
   const Material& material = scene.materials[mesh.material];
-  for (const auto& reference : {material.reflectance_texture, material.emissive_texture}) {
+  for (const auto& reference :
+       {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
     if (reference && (reference->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty() && !mesh.triangles.empty()) {
       return invalid_argument(name + ": its material uses a texture by TEXCOORD_" +
                               std::to_string(reference->texcoord) + ", which the mesh does not have");
@@ -87,7 +88,17 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
   if (max_component(passed_on) > 1 + kRounding) {
     return invalid_argument(name + ": reflectance + transmittance reaches " + in_words(passed_on) + ", above 1");
   }
-  for (const auto& reference : {material.reflectance_texture, material.emissive_texture}) {
+  const Vec3 sent_on = material.reflectance + material.diffuse_transmittance;
+  if (!is_finite(material.diffuse_transmittance) || min_component(material.diffuse_transmittance) < 0 ||
+      max_component(sent_on) >= 1) {
+    return invalid_argument(name + ": reflectance " + in_words(material.reflectance) + " and diffuse transmittance " +
+                            in_words(material.diffuse_transmittance) + " are not at least 0 and below 1 together");
+  }
+  if (max_component(material.diffuse_transmittance) > 0 && !material.is_double_sided) {
+    return invalid_argument(name + ": light goes through it scattered, but it is single-sided");
+  }
+  for (const auto& reference :
+       {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
     if (!reference) continue;
     if (reference->texture < 0 || static_cast<std::size_t>(reference->texture) >= scene.textures.size()) {
       return invalid_argument(name + ": texture " + std::to_string(reference->texture) + " does not exist; there are " +
@@ -105,13 +116,25 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
                               ", is not finite in single precision");
     }
   }
-  // The product of factor and texture must reflect less than it gets, everywhere.
-  if (material.reflectance_texture) {
-    const TexturePlane& texture = scene.textures[material.reflectance_texture->texture];
+  // The product of factor and texture must send on less than it gets, everywhere.
+  const auto brightest_of = [&scene](const std::optional<TextureReference>& reference) {
+    if (!reference) return Vec3{1, 1, 1};
+    const TexturePlane& texture = scene.textures[reference->texture];
     Vec3 brightest;
     for (std::size_t at = 0; at + 2 < texture.values.size(); at += texture.channels) {
       for (int c = 0; c < 3; ++c) brightest[c] = std::fmax(brightest[c], texture.values[at + c]);
     }
+    return brightest;
+  };
+  const Vec3 both_sides =
+      scaled_by(material.reflectance, brightest_of(material.reflectance_texture)) +
+      scaled_by(material.diffuse_transmittance, brightest_of(material.diffuse_transmittance_texture));
+  if (max_component(material.diffuse_transmittance) > 0 && max_component(both_sides) >= 1) {
+    return invalid_argument(name + ": reflectance and diffuse transmittance times their textures reach " +
+                            in_words(both_sides) + ", not below 1");
+  }
+  if (material.reflectance_texture) {
+    const Vec3 brightest = brightest_of(material.reflectance_texture);
     const Vec3 product = scaled_by(material.reflectance, brightest);
     if (max_component(product) >= 1) {
       return invalid_argument(name + ": reflectance times texture reaches " + in_words(product) + ", not below 1");
@@ -170,6 +193,14 @@ Result<void> check_light(const Scene& scene, std::size_t i) {
                               std::to_string(spot->inner_cone_radians) + " and " +
                               std::to_string(spot->outer_cone_radians));
     }
+  } else if (const auto* luminaire = std::get_if<ProfileLight>(&kind)) {
+    if (!is_finite(luminaire->position)) return invalid_argument(name + ": position is not finite");
+    if (!is_direction(luminaire->direction) || !is_direction(luminaire->zero_side)) {
+      return invalid_argument(name + ": direction or zero side is not of unit length");
+    }
+    if (!is_amount(luminaire->tint)) return invalid_argument(name + ": tint " + in_words(luminaire->tint));
+    const Result<void> profile = check_profile(luminaire->profile);
+    if (!profile.ok()) return invalid_argument(name + ": " + profile.error().message);
   } else if (const auto* sun = std::get_if<DirectionalLight>(&kind)) {
     if (!is_direction(sun->direction)) return invalid_argument(name + ": direction is not of unit length");
     if (!is_amount(sun->illuminance))

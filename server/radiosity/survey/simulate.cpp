@@ -35,6 +35,7 @@ Vec3 mean_over(std::uint32_t triangle, const SobolPoints& points, const Property
 bool is_simulated(const Light& light, const EffectSet& set) {
   if (std::holds_alternative<PointLight>(light.kind)) return set.has(Effect::kPoint);
   if (std::holds_alternative<SpotLight>(light.kind)) return set.has(Effect::kSpot);
+  if (std::holds_alternative<ProfileLight>(light.kind)) return set.has(Effect::kIes);
   return set.has(std::get<DirectionalLight>(light.kind).angular_diameter_radians > 0 ? Effect::kSun
                                                                                      : Effect::kDirectional);
 }
@@ -55,6 +56,8 @@ void Surfaces::simulate(const EffectSet& set) {
     if (!set.has(Effect::kEmitters)) material.emissive = {};
     if (!set.has(Effect::kAlphaMask) || stops_all(material, *scene)) material.alpha_mode = AlphaMode::kOpaque;
     if (!set.has(Effect::kTint)) material.transmittance = {};
+    // Through what has no back nothing comes.
+    if (!set.has(Effect::kDiffuseTransmission) || !set.has(Effect::kTwoSided)) material.diffuse_transmittance = {};
     if (!set.has(Effect::kTwoSided)) material.is_double_sided = false;
   }
   lights.clear();
@@ -66,14 +69,18 @@ void Surfaces::simulate(const EffectSet& set) {
 
   const SobolPoints points(kMeanSamples);
   mean_reflectances.clear();
+  mean_diffuse_transmittances.clear();
   if (!set.has(Effect::kTexturedReflectance)) {
-    std::vector<Vec3> means(size());
+    std::vector<Vec3> means(size()), through(size());
     for (std::uint32_t t = 0; t < size(); ++t) {
       const bool varies = material(t).reflectance_texture || !mesh(t).colors.empty();
       const auto reflectance_at = [this](const SurfacePoint& p) { return reflectance(p); };
       means[t] = varies ? mean_over(t, points, reflectance_at) : reflectance({t, 0, 0});
+      const auto through_at = [this](const SurfacePoint& p) { return diffuse_transmittance(p); };
+      through[t] = material(t).diffuse_transmittance_texture ? mean_over(t, points, through_at) : through_at({t, 0, 0});
     }
     mean_reflectances = std::move(means);
+    mean_diffuse_transmittances = std::move(through);
   }
   find_emitters(points);
 }

@@ -72,6 +72,18 @@ Vec3 Surfaces::reflectance(const SurfacePoint& p) const {
   return reflectance;
 }
 
+Vec3 Surfaces::diffuse_transmittance(const SurfacePoint& p) const {
+  if (!mean_diffuse_transmittances.empty()) return mean_diffuse_transmittances[p.triangle];
+  const Material& own = material(p.triangle);
+  if (max_component(own.diffuse_transmittance) <= 0) return {};
+  Vec3 through = textured(*this, p, own.diffuse_transmittance, own.diffuse_transmittance_texture);
+  if (max_component(own.transmittance) <= 0) return through;
+  const Vec3 passed = passed_share(*this, p);
+  if (!effects.has(Effect::kColor)) through = in_grey(through);
+  for (int c = 0; c < 3; ++c) through[c] = passed[c] < 1 ? through[c] / (1 - passed[c]) : 0;
+  return through;
+}
+
 Vec3 Surfaces::opacity(const SurfacePoint& p) const {
   const Material& own = material(p.triangle);
   double coverage = 1;

@@ -45,7 +45,8 @@ class Surfaces {
   std::vector<double> ray_offsets;       ///< how far ray origins are lifted off the surface
   std::vector<Vec3> exitances;           ///< E = pi L, mean over the triangle, lx
   std::vector<std::uint8_t> is_emitter;  ///< small and bright: lights by sampling, E_out of the rows
-  std::vector<Vec3> mean_reflectances;   ///< where Effect::kTexturedReflectance is off, else empty
+  // Where Effect::kTexturedReflectance is off, else empty.
+  std::vector<Vec3> mean_reflectances, mean_diffuse_transmittances;
 
   std::size_t size() const { return corners.size(); }
   const Mesh& mesh(std::uint32_t triangle) const { return scene->meshes[meshes[triangle]]; }
@@ -77,6 +78,12 @@ class Surfaces {
   /// Reflectance of what is opaque there: factor times texture times the vertices' colours over 1 - transmittance, each
   /// channel in [0, 1).
   Vec3 reflectance(const SurfacePoint& p) const;
+  /// Whether light goes through scattered: a leaf, a curtain.
+  bool is_translucent(std::uint32_t triangle) const {
+    return max_component(material(triangle).diffuse_transmittance) > 0;
+  }
+  /// Share of the light on the other side of what is opaque there that leaves this one, scattered.
+  Vec3 diffuse_transmittance(const SurfacePoint& p) const;
   /// Exitance there: pi times factor times texture, lx.
   Vec3 exitance(const SurfacePoint& p) const;
 

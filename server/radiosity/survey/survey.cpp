@@ -102,11 +102,13 @@ Result<SurveyedScene> survey_scene(const Scene& scene) {
   }
   out.surfaces.simulate(EffectSet::all());
   count_emitters(out);
-  const ScenePlanes planes = find_scene_planes(out.surfaces);
-  survey.is_convex = planes.is_convex;
-  survey.is_exposed = planes.is_exposed;
-  survey.is_closed = planes.is_convex && is_watertight(out.surfaces);
   find_material_facts(out.surfaces, survey);
+  const ScenePlanes planes = find_scene_planes(out.surfaces);
+  // Planes tell of fronts: what light enters by backs is another matter.
+  const bool is_of_fronts = survey.area_translucent_m2 <= 0;
+  survey.is_convex = is_of_fronts && planes.is_convex;
+  survey.is_exposed = is_of_fronts && planes.is_exposed;
+  survey.is_closed = survey.is_convex && is_watertight(out.surfaces);
   find_light_facts(out.surfaces, planes, survey);
   if (survey.emitted_lumens <= 0 && scene.lights.empty() && !survey.has_sky && !scene.environment) {
     return invalid_argument(

@@ -45,23 +45,25 @@ struct Survey {
   double min_reflectance = 0;
   std::uint64_t num_instances = 0;  ///< of meshes that the file places more than once
   bool is_grey = false;             ///< reflectance, emission and lights have equal channels everywhere
-  bool is_convex = false;   ///< every vertex lies on or before every triangle's plane: nothing can hide anything
+  bool is_convex = false;   ///< every vertex lies on or before every triangle's plane: nothing can hide anything;
+                            ///< false where light reaches fronts through backs
   bool is_closed = false;   ///< convex, and every edge is shared: nothing escapes
   double escape_share = 0;  ///< of probe rays from all fronts
   double escape_share_interval = 0;  ///< half of its 95 % interval
   std::uint64_t num_probe_rays = 0;
-  double area_masked_m2 = 0;  ///< by materials that are masked or blended and not opaque in fact
-  double area_tinted_m2 = 0;  ///< that light passes straight through
+  double area_masked_m2 = 0;       ///< by materials that are masked or blended and not opaque in fact
+  double area_tinted_m2 = 0;       ///< that light passes straight through
+  double area_translucent_m2 = 0;  ///< that lets light through scattered
   double area_double_sided_m2 = 0;
   double area_specular_m2 = 0;  ///< not simulated, as the three that follow
   double area_refractive_m2 = 0;
   double area_normal_mapped_m2 = 0;
   double area_volume_m2 = 0;
   std::uint64_t num_textures_flat = 0;          ///< of one value in fact
-  double lamp_lumens = 0;                       ///< of point and spot lights
+  double lamp_lumens = 0;                       ///< of point and spot lights and luminaires
   std::vector<std::string> brightest_emitters;  ///< up to 3 meshes with most lumens
   // What decides about effects beside.
-  LightFacts point = {}, spot = {}, directional = {}, sun = {};
+  LightFacts point = {}, spot = {}, ies = {}, directional = {}, sun = {};
   double sun_diameter_radians = 0;  ///< of the widest
   bool has_environment = false, is_environment_lit = false;
   VariationFacts varying_reflectance = {}, varying_emission = {};

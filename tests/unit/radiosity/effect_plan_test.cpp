@@ -318,6 +318,26 @@ INSTANTIATE_TEST_SUITE_P(
                    }),
               {"point", "sky", "interreflection", "tint"},
               {"occlusion", "color"}},
+        Calls{"DiffuseTransmission",
+              with(lit_room,
+                   [](Scene& s) {
+                     s.materials[0].is_double_sided = true;
+                     s.materials[0].diffuse_transmittance = {0.25, 0.25, 0.25};
+                   }),
+              {"point", "occlusion", "interreflection", "diffuse_transmission", "two_sided"},
+              {"color"}},
+        Calls{"Luminaire",
+              with(lit_room,
+                   [](Scene& s) {
+                     ProfileLight light;
+                     light.position = std::get<PointLight>(s.lights[0].kind).position;
+                     light.direction = {0, -1, 0};
+                     light.zero_side = {1, 0, 0};
+                     light.profile = {{0, 90}, {0}, {10, 10}};
+                     s.lights[0].kind = light;
+                   }),
+              {"ies", "interreflection"},
+              {"occlusion", "color"}},
         Calls{"TwoSided",
               with(furnished_room, [](Scene& s) { s.materials[0].is_double_sided = true; }),
               {"point", "occlusion", "interreflection", "two_sided"},

@@ -314,5 +314,55 @@ TEST(LargestKey, AgreesWithAScanWhileKeysChange) {
   }
 }
 
+/// Every other patch is the back of the one before it, and lets through a share of its own.
+RandomEnclosure translucent_enclosure(std::size_t n, std::uint64_t seed) {
+  RandomEnclosure enclosure = random_enclosure(n, 0.5, seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(0, 0.45);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t other = i % 2 == 0 ? i + 1 : i - 1;
+    enclosure.problem.other_side.push_back(other < n ? other : i);
+    const bool is_opaque = other >= n || i / 2 % 3 == 0;
+    enclosure.problem.transmittance.push_back(is_opaque ? Vec3{} : Vec3{share(random), share(random), share(random)});
+  }
+  return enclosure;
+}
+
+// r = source + rho F B + tau (F B)_opp - B, written out.
+double largest_residual(const RandomEnclosure& enclosure, const std::vector<Vec3>& radiosity) {
+  std::vector<Vec3> irradiance(radiosity.size());
+  enclosure.transport.gather(radiosity, irradiance);
+  double largest = 0;
+  for (std::size_t i = 0; i < radiosity.size(); ++i) {
+    const RadiosityProblem& p = enclosure.problem;
+    const Vec3 r = p.source[i] + scaled_by(p.reflectance[i], irradiance[i]) +
+                   scaled_by(p.transmittance[i], irradiance[p.other_side[i]]) - radiosity[i];
+    largest = std::max(largest, std::max(std::fabs(r.x), std::max(std::fabs(r.y), std::fabs(r.z))));
+  }
+  return largest;
+}
+
+TEST(EverySolver, LetsLightThroughScattered) {
+  const RandomEnclosure enclosure = translucent_enclosure(41, 5);
+  SolveOptions options;
+  options.relative_tolerance = 1e-9;
+  options.max_sweeps = 100'000;
+  const Solved exact = solve_from_dark(Solver::kLu, enclosure.transport, enclosure.problem, options);
+  EXPECT_LE(largest_residual(enclosure, exact.radiosity), 1e-9);
+  for (const Solver solver : kAllSolvers) {
+    const Solved solved = solve_from_dark(solver, enclosure.transport, enclosure.problem, options);
+    EXPECT_EQ(solved.report.status, SolveStatus::kConverged) << solver_name(solver);
+    EXPECT_LE(largest_difference(solved.radiosity, exact.radiosity),
+              solved.report.error_bound + exact.report.error_bound)
+        << solver_name(solver);
+  }
+  // And it matters.
+  RadiosityProblem opaque = enclosure.problem;
+  opaque.transmittance.clear();
+  opaque.other_side.clear();
+  const Solved without = solve_from_dark(Solver::kLu, enclosure.transport, opaque, options);
+  EXPECT_GT(largest_difference(without.radiosity, exact.radiosity), 0.1);
+}
+
 }  // namespace
 }  // namespace radbake::radiosity

@@ -167,8 +167,7 @@ class SceneReader {
     Mesh& mesh = local.welded.mesh;
     RADBAKE_ASSIGN_OR_RETURN(mesh.material, materials_.scene_material(primitive.material));
     RADBAKE_RETURN_IF_ERROR(check_texcoords(mesh, label, texcoord0_set));
-    local.limited_share = limit_colors(mesh, materials_.materials()[mesh.material], materials_.facts()[mesh.material],
-                                       options_.max_reflectance);
+    local.limited_share = limit_colors(mesh, materials_.facts()[mesh.material], options_.max_reflectance);
     const std::string mesh_name = source.name.empty() ? "mesh" + std::to_string(mesh_index) : printable(source.name);
     for (const Placement& instance : placed) {
       const std::string& node = model_.nodes[instance.node].name;
@@ -188,7 +187,8 @@ class SceneReader {
   // A texture needs the coordinates that it names.
   Result<void> check_texcoords(const Mesh& mesh, const std::string& label, int texcoord0_set) {
     const Material& material = materials_.materials()[mesh.material];
-    for (const auto& texture : {material.reflectance_texture, material.emissive_texture}) {
+    for (const auto& texture :
+         {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
       if (!texture || !(texture->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty()) continue;
       return invalid_argument(label + ": its material " + in_quotes(material.name) + " has a texture on TEXCOORD_" +
                               std::to_string(texture->texcoord == 0 ? texcoord0_set : 1) +

@@ -84,6 +84,15 @@ const tinygltf::Value* diffuse_transmission(const tinygltf::Material& material) 
   return is_unlit(material) ? nullptr : extension(material.extensions, "KHR_materials_diffuse_transmission");
 }
 
+bool is_translucent(const tinygltf::Material& material) {
+  const tinygltf::Value* diffuse = diffuse_transmission(material);
+  if (number(diffuse, "diffuseTransmissionFactor", 0) <= 0) return false;
+  if (!diffuse->Has("diffuseTransmissionColorFactor")) return true;
+  const tinygltf::Value& color = diffuse->Get("diffuseTransmissionColorFactor");
+  return color.Get(0).GetNumberAsDouble() > 0 || color.Get(1).GetNumberAsDouble() > 0 ||
+         color.Get(2).GetNumberAsDouble() > 0;
+}
+
 // A texture that an extension uses: tinygltf leaves it as it stands in the file. Index -1: there is none.
 tinygltf::TextureInfo texture_info(const tinygltf::Value* object, const char* key) {
   tinygltf::TextureInfo info;
@@ -292,6 +301,7 @@ Result<void> MaterialReader::read_emission(const tinygltf::Material& source, Mat
 
 Result<void> MaterialReader::read(const tinygltf::Material& source, Material& material, MaterialFacts& facts) {
   RADBAKE_RETURN_IF_ERROR(read_reflectance(source, material, facts));
+  facts.limited = material.reflectance;
   RADBAKE_RETURN_IF_ERROR(read_emission(source, material));
   material.is_double_sided = source.doubleSided;
   RADBAKE_RETURN_IF_ERROR(read_diffuse_transmission(source, material, facts));
@@ -308,12 +318,12 @@ Result<int> MaterialReader::texcoord0_set(int index) const {
   const tinygltf::Material& material = model_.materials[index];
   const tinygltf::TextureInfo& color = material.pbrMetallicRoughness.baseColorTexture;
   const tinygltf::TextureInfo& emission = material.emissiveTexture;
-  const tinygltf::TextureInfo through =
-      texture_info(diffuse_transmission(material), "diffuseTransmissionColorTexture");
+  const tinygltf::TextureInfo through = texture_info(diffuse_transmission(material), "diffuseTransmissionColorTexture");
   std::vector<std::pair<int, std::string>> sets;
   if (color.index >= 0) sets.emplace_back(texcoord_set(color), "baseColorTexture");
   if (emission.index >= 0 && is_emissive(material)) sets.emplace_back(texcoord_set(emission), "emissiveTexture");
-  if (through.index >= 0) sets.emplace_back(texcoord_set(through), "diffuseTransmissionColorTexture");
+  if (through.index >= 0 && is_translucent(material))
+    sets.emplace_back(texcoord_set(through), "diffuseTransmissionColorTexture");
   std::erase_if(sets, [](const auto& use) { return use.first == 1; });
   if (sets.empty()) return 0;
   const auto other =

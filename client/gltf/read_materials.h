@@ -18,6 +18,7 @@ namespace radbake::gltf {
 struct MaterialFacts {
   double limited_share = 0;  ///< of its surface, by texels: reflectance above the limit
   Vec3 untextured;           ///< reflectance before it was limited; zero where a texture multiplies it
+  Vec3 limited;              ///< and after, before diffuse transmission takes its share
   bool is_metallic = false;
   bool has_transmission_texture = false;
   bool has_diffuse_transmission_texture = false;  ///< of the share, not of the colour
@@ -41,11 +42,11 @@ class MaterialReader {
   ///
   ///   reflectance = base (diffuse - T dielectric),   transmittance = base T dielectric,   T: transmission factor
   ///
-  /// Diffuse transmission takes its share D of what is reflected: reflectance (1 - D), diffuse transmittance D times its
-  /// colour, at most the limit; D is the mean where a texture multiplies it.
-  /// A texture of metalness and roughness is followed texel by texel, at the centres of the base colour's texels, where
-  /// both are looked up alike and nothing is transmitted; elsewhere by the mean of its shares.
-  /// Errors: kInvalidArgument, naming the material and the texture or image.
+  /// Diffuse transmission takes its share D of what is reflected: reflectance (1 - D), diffuse transmittance D times
+  /// its colour, at most the limit; D is the mean where a texture multiplies it. A texture of metalness and roughness
+  /// is followed texel by texel, at the centres of the base colour's texels, where both are looked up alike and nothing
+  /// is transmitted; elsewhere by the mean of its shares. Errors: kInvalidArgument, naming the material and the texture
+  /// or image.
   Result<int> scene_material(int material);
 
   /// Which TEXCOORD_n becomes the texcoord0 of a mesh of a material of the file: the one that its textures use beside

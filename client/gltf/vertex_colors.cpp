@@ -12,8 +12,8 @@ void drop_white_colors(Mesh& mesh) {
   if (std::all_of(mesh.colors.begin(), mesh.colors.end(), is_white)) mesh.colors.clear();
 }
 
-double limit_colors(Mesh& mesh, const Material& material, const MaterialFacts& facts, double max_reflectance) {
-  const Vec3 factor = facts.untextured, limited = material.reflectance;
+double limit_colors(Mesh& mesh, const MaterialFacts& facts, double max_reflectance) {
+  const Vec3 factor = facts.untextured, limited = facts.limited;
   if (mesh.colors.empty() || facts.limited_share == 0 || factor == Vec3{}) return facts.limited_share;
   // Where a vertex is above the limit, its triangles are counted whole.
   const auto is_above = [&](std::uint32_t vertex) {

@@ -13,6 +13,6 @@ void drop_white_colors(Mesh& mesh);
 ///
 /// Where no texture multiplies them, the limit is on the product of factor and colour, so a white material of dark
 /// vertices loses nothing: with factor f, f' = min(f, limit) and colour c, f' c' = min(f c, limit).
-double limit_colors(Mesh& mesh, const Material& material, const MaterialFacts& facts, double max_reflectance);
+double limit_colors(Mesh& mesh, const MaterialFacts& facts, double max_reflectance);
 
 }  // namespace radbake::gltf

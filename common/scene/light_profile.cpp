@@ -19,7 +19,8 @@ struct Place {
 Place place_of(const std::vector<double>& values, double value) {
   if (values.size() < 2) return {};
   const auto above = std::upper_bound(values.begin(), values.end(), value);
-  const auto next = std::clamp<std::ptrdiff_t>(above - values.begin(), 1, static_cast<std::ptrdiff_t>(values.size()) - 1);
+  const auto next =
+      std::clamp<std::ptrdiff_t>(above - values.begin(), 1, static_cast<std::ptrdiff_t>(values.size()) - 1);
   const auto at = static_cast<std::size_t>(next - 1);
   return {at, std::clamp((value - values[at]) / (values[at + 1] - values[at]), 0.0, 1.0)};
 }
@@ -101,7 +102,8 @@ Result<void> check_profile(const LightProfile& profile) {
   RADBAKE_RETURN_IF_ERROR(check_angles(profile.vertical_degrees, "vertical", 180));
   RADBAKE_RETURN_IF_ERROR(check_angles(profile.horizontal_degrees, "horizontal", 360));
   const double first = profile.horizontal_degrees.front(), last = profile.horizontal_degrees.back();
-  const bool is_whole = profile.horizontal_degrees.size() == 1 ? first == 0 : first == 0 && (last == 90 || last == 180 || last == 360);
+  const bool is_whole =
+      profile.horizontal_degrees.size() == 1 ? first == 0 : first == 0 && (last == 90 || last == 180 || last == 360);
   if (!is_whole) {
     return invalid_argument("its horizontal angles go from " + in_words(first) + " to " + in_words(last) +
                             ": must be 0 alone, or 0 to 90, 180 or 360");

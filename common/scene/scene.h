@@ -68,8 +68,9 @@ struct Material {
   /// A thin sheet: this share of the light goes straight through. The reflectance texture multiplies it too;
   /// reflectance + transmittance <= 1 in each channel.
   Vec3 transmittance = {};
-  /// A leaf, a curtain: this share tau of the light that arrives on one side leaves the other one, scattered; the texture
-  /// multiplies it. reflectance + diffuse_transmittance < 1 in each channel. Both sides send and receive light then.
+  /// A leaf, a curtain: this share tau of the light that arrives on one side leaves the other one, scattered; the
+  /// texture multiplies it. reflectance + diffuse_transmittance < 1 in each channel. Both sides send and receive light
+  /// then.
   Vec3 diffuse_transmittance = {};
   std::optional<TextureReference> diffuse_transmittance_texture = std::nullopt;
   // What the file asks for and a diffuse bake does not simulate.

@@ -30,11 +30,23 @@ constexpr int kPatchesOfMethods = 1000;
 
 /// Every pair of patches has its price by formula: minutes above.
 constexpr std::uint64_t kMaxPatchesByFormula = 2000;
+/// And every triangle that may hide something of a pair: one pair may take minutes above.
+constexpr std::uint64_t kMaxTrianglesByFormula = 2000;
 
 double cpu_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+bool is_by_formula(radiosity::FormFactors method) {
+  return method == radiosity::FormFactors::kAnalytic || method == radiosity::FormFactors::kAdaptive;
+}
+
+std::uint64_t num_triangles(const Scene& scene) {
+  std::uint64_t num = 0;
+  for (const Mesh& mesh : scene.meshes) num += mesh.triangles.size();
+  return num;
 }
 
 bool is_layer(const std::string& layer, const std::string& start) {
@@ -346,6 +358,12 @@ Result<AccuracyStudy> study_accuracy(const Scene& scene, const AccuracySweep& sw
     return {};
   };
   for (const FixedSetting& fixed : sweep.settings) {
+    if (is_by_formula(fixed.options.form_factors) && num_triangles(scene) > kMaxTrianglesByFormula) {
+      on_bake(done++, total, setting_words(fixed.options));
+      study.left_out.push_back(setting_words(fixed.options) + ": by formula, a scene of " +
+                               std::to_string(num_triangles(scene)) + " triangles takes hours");
+      continue;
+    }
     RADBAKE_RETURN_IF_ERROR(run_one(fixed.options, setting_words(fixed.options), {fixed, 0, 0, {}}));
   }
   const auto run_progressive = [&](double target, double budget) {

@@ -12,6 +12,7 @@ namespace {
 using radbake::study::AccuracyChoices;
 using radbake::study::CaseChoices;
 using radbake::study::SceneChoices;
+using radbake::study::ViewChoices;
 
 std::string check_positive(const std::string& text) {
   const double value = std::strtod(text.c_str(), nullptr);

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <span>
-#include <tuple>
+#include <utility>
 
 #include "client/gltf/read_gltf.h"
 #include "client/image/decode_image.h"
@@ -27,31 +27,43 @@ using radiosity::Ray;
 using radiosity::SurfacePoint;
 using radiosity::Surfaces;
 
+/// A whole number of an object, -1 where it has none.
+int whole_of(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number_integer() ? found->get<int>() : -1;
+}
+
+/// A text of an object, or another where it has none.
+std::string text_of(const nlohmann::json& object, const char* key, const std::string& otherwise) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : otherwise;
+}
+
 Result<nlohmann::json> read_json(const std::filesystem::path& path) {
   std::ifstream file(path);
   nlohmann::json document = nlohmann::json::parse(file, nullptr, false);
-  if (document.is_discarded() || !document.is_object() || !document.contains("lightmaps") ||
-      !document.contains("meshes")) {
+  if (!document.is_object() || !document["lightmaps"].is_array() || !document["meshes"].is_array()) {
     return invalid_argument(path.string() + " is missing or is not what radbake writes");
   }
   return document;
 }
 
-/// Primitives by node, mesh and place in it.
-using Primitive = std::tuple<int, int, int>;
+/// Primitives by node and place in its mesh: of placed meshes, scene.glb has copies.
+using Primitive = std::pair<int, int>;
 
 std::map<Primitive, int> lightmaps_of(const nlohmann::json& document) {
   std::map<Primitive, int> out;
   for (const nlohmann::json& mesh : document["meshes"]) {
-    if (!mesh.contains("lightmap") || !mesh["lightmap"].is_number_integer()) continue;
-    out[{mesh.value("node", -1), mesh.value("mesh", -1), mesh.value("primitive", -1)}] = mesh["lightmap"];
+    out[{whole_of(mesh, "node"), whole_of(mesh, "primitive")}] = whole_of(mesh, "lightmap");
   }
   return out;
 }
 
 std::string exr_of(const nlohmann::json& lightmap) {
-  for (const nlohmann::json& file : lightmap.value("files", nlohmann::json::array())) {
-    if (file.value("encoding", "") == "exr") return file.value("file", "");
+  const auto files = lightmap.find("files");
+  if (files == lightmap.end()) return "";
+  for (const nlohmann::json& file : *files) {
+    if (text_of(file, "encoding", "") == "exr") return text_of(file, "file", "");
   }
   return "";
 }
@@ -95,6 +107,30 @@ class Lens {
   double tangent_;
 };
 
+/// The nearest surfaces that are seen: rays go on behind the backs of single-sided ones, as engines leave those out.
+/// Directions are of unit length; origins move.
+void see(const radiosity::Visibility& visibility, const Surfaces& surfaces, std::vector<Ray>& rays,
+         std::vector<Hit>& hits) {
+  constexpr int kMostBacks = 64;
+  visibility.trace(rays, hits);
+  std::vector<std::uint8_t> is_hidden(rays.size());
+  for (int k = 0; k < kMostBacks; ++k) {
+    bool is_any_hidden = false;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const std::uint32_t triangle = hits[i].triangle;
+      const std::array<float, 3>& d = rays[i].direction;
+      is_hidden[i] = triangle != radiosity::kNoHit && !surfaces.material(triangle).is_double_sided &&
+                     dot(surfaces.normals[triangle], Vec3{d[0], d[1], d[2]}) > 0;
+      if (!is_hidden[i]) continue;
+      is_any_hidden = true;
+      const auto beyond = static_cast<float>(static_cast<double>(hits[i].distance) + surfaces.ray_offsets[triangle]);
+      for (std::size_t c = 0; c < 3; ++c) rays[i].origin[c] += beyond * d[c];
+    }
+    if (!is_any_hidden) return;
+    visibility.trace_again(rays, is_hidden, hits);
+  }
+}
+
 /// What a ray sees of the surface that it met.
 Vec3 luminance_at(const BakedScene& baked, const Surfaces& surfaces, const Hit& hit) {
   const SurfacePoint p{hit.triangle, static_cast<double>(hit.u), static_cast<double>(hit.v)};
@@ -128,11 +164,11 @@ Result<BakedScene> read_baked_scene(const std::filesystem::path& folder) {
   const auto decode = [](std::span<const std::byte> bytes, const std::string& name, bool is_srgb) {
     return image::decode_image(bytes, name, is_srgb);
   };
-  const std::filesystem::path scene = folder / document.value("scene", "scene.glb");
+  const std::filesystem::path scene = folder / text_of(document, "scene", "scene.glb");
   RADBAKE_ASSIGN_OR_RETURN(gltf::GltfScene read, gltf::read_gltf(scene, decode, {}));
   const std::map<Primitive, int> known = lightmaps_of(document);
   for (const gltf::MeshSource& source : read.sources) {
-    const auto found = known.find({source.node, source.mesh, source.primitive});
+    const auto found = known.find({source.node, source.primitive});
     const int map = found == known.end() ? -1 : found->second;
     if (map >= static_cast<int>(baked.lightmaps.size())) {
       return invalid_argument(folder.string() + ": mesh " + std::to_string(source.mesh) + " lies in lightmap " +
@@ -226,7 +262,8 @@ Result<image::Pixels> render_view(const BakedScene& baked, const Camera& camera,
           }
         }
         for (int channel = 0; channel < num_channels; ++channel) {
-          visibility->channel(channel).trace(rays, hits);
+          std::vector<Ray> onward = rays;
+          see(visibility->channel(channel), surfaces, onward, hits);
           for (std::size_t k = 0; k < row_size; ++k) {
             const Vec3 l =
                 hits[k].triangle == radiosity::kNoHit ? options.background : luminance_at(baked, surfaces, hits[k]);

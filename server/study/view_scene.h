@@ -45,7 +45,8 @@ struct ViewOptions {
 ///
 ///   L = (rho + tau) E / pi + L_e
 ///
-/// Rays pass holes and sheets as a bake's do; a sheet's colour is seen by a ray for each channel.
+/// Rays pass holes and sheets as a bake's do; a sheet's colour is seen by a ray for each channel. Backs of single-sided
+/// surfaces are not seen, so that one may look into a room from outside.
 /// Shapes: values [height * width * 3]. Errors: kInvalidArgument: the camera looks nowhere.
 Result<image::Pixels> render_view(const BakedScene& baked, const Camera& camera, const ViewOptions& options);
 

@@ -4,7 +4,7 @@
 
 OUT.npy: [size, size, 4] float32, rows from the top as glTF counts them; irradiance / pi of direct and indirect light,
 alpha 1 inside charts. The layout is the file's TEXCOORD_1. Materials are exact Lambertian ones with the file's base
-colours and emission: no textures, no lamps, black surroundings. Cycles takes every surface for double-sided.
+colours and emission, or their textures: no lamps, black surroundings. Cycles takes every surface for double-sided.
 The last line on stdout is JSON: CPU and wall seconds of the bake alone, without start, import and files.
 """
 import argparse
@@ -27,15 +27,22 @@ def cpu_seconds():
 
 
 def read_materials(path):
-    """{name: (base colour, radiance)} of a .glb."""
+    """{name: (base colour, radiance, PNG of whichever has a texture)} of a .glb."""
     with open(path, "rb") as file:
         length, = struct.unpack("<12xI4x", file.read(20))
         gltf = json.loads(file.read(length))
+        blob = file.read()[8:]
     materials = {}
     for m in gltf["materials"]:
         strength = m.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1)
         radiance = [strength * v for v in m.get("emissiveFactor", (0, 0, 0))]
-        materials[m["name"]] = m.get("pbrMetallicRoughness", {}).get("baseColorFactor", (1, 1, 1, 1))[:3], radiance
+        surface = m.get("pbrMetallicRoughness", {})
+        texture = m.get("emissiveTexture") if max(radiance) > 0 else surface.get("baseColorTexture")
+        png = None
+        if texture:
+            view = gltf["bufferViews"][gltf["images"][gltf["textures"][texture["index"]]["source"]]["bufferView"]]
+            png = blob[view.get("byteOffset", 0):][:view["byteLength"]]
+        materials[m["name"]] = surface.get("baseColorFactor", (1, 1, 1, 1))[:3], radiance, png
     return materials
 
 
@@ -53,10 +60,22 @@ def import_as_one(path):
     return bpy.context.view_layer.objects.active
 
 
-def make_lambertian(material, reflectance, radiance, image):
+def add_texture(nodes, png, name):
+    """As TEXCOORD_0 lays it; its factors are all one in what is compared."""
+    image = bpy.data.images.new(name, 1, 1)
+    image.pack(data=png, data_len=len(png))
+    image.source = "FILE"
+    image.colorspace_settings.name = "sRGB"
+    node = nodes.new("ShaderNodeTexImage")
+    node.image = image
+    return node
+
+
+def make_lambertian(material, reflectance, radiance, png, image):
     """A diffuse or glowing surface, and the image that the bake goes to."""
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
+    textured = add_texture(nodes, png, material.name) if png else None
     if max(radiance) > 0:
         surface = nodes.new("ShaderNodeEmission")
         strength = max(radiance)
@@ -66,6 +85,11 @@ def make_lambertian(material, reflectance, radiance, image):
         surface = nodes.new("ShaderNodeBsdfDiffuse")
         surface.inputs["Color"].default_value = (*reflectance, 1)
         surface.inputs["Roughness"].default_value = 0
+    if textured:
+        coordinates = nodes.new("ShaderNodeUVMap")
+        coordinates.uv_map = "UVMap"  # as the importer names TEXCOORD_0
+        links.new(coordinates.outputs["UV"], textured.inputs["Vector"])
+        links.new(textured.outputs["Color"], surface.inputs["Color"])
     links.new(surface.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     target = nodes.new("ShaderNodeTexImage")
     target.image = image

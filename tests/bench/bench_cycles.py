@@ -162,9 +162,10 @@ def main():
           "to the true error | ratio |\n|---|---|---|---|---|---|---|---|---|---|")
     for r in ours:
         cells = []
-        for error in r["target"], r["error"]:
+        for error, key in (r["target"], "to_target"), (r["error"], "to_true_error"):
             spp = (k / error) ** 2 if error > 0 else math.inf
-            cells += [f"{'~' if spp > max(spps) else ''}{fixed + each * spp:.1f}", f"{(fixed + each * spp) / r['cpu']:.0f}"]
+            r[key] = {"cycles_cpu": fixed + each * spp, "ratio": (fixed + each * spp) / r["cpu"]}
+            cells += [f"{'~' if spp > max(spps) else ''}{r[key]['cycles_cpu']:.1f}", f"{r[key]['ratio']:.0f}"]
         print(f"| {100 * r['target']:g} % | {r['passes']} | {100 * r['stated']:.2f} % | {100 * r['error']:.2f} % | "
               f"{r['cpu']:.2f} | {r['whole']:.2f} | " + " | ".join(cells) + " |")
     (bench.out / "bench.json").write_text(json.dumps({"radbake": ours, "cycles": theirs}, indent=2) + "\n")

@@ -23,6 +23,10 @@ EXIT_SKIPPED = 77
 SCENE_OPTIONS = {
     "cornell.glb": ["--atlas-size", "64"],
     "tile-game-room6.glb": ["--sky", "1,1,1", "--atlas-size", "128"],
+    "goral.glb": ["--texels-per-meter", "4"],
+    "simple.glb": ["--texels-per-meter", "4"],
+    "computer.glb": ["--texels-per-meter", "4"],
+    "vermeer.glb": ["--sky", "1,1,1", "--texels-per-meter", "4"],
 }
 QUICK = ["--rays", "16", "--max-patches", "300"]
 # A feature of glTF each: what it becomes is worth a look, its light is not.

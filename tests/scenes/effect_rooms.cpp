@@ -209,8 +209,10 @@ Scene everything(bool has_environment) {
   room.at(panel).emissive = grey(20);
   room.at(panel).emissive_texture = room.texture(16, 16, 3, two_halves);
   room.quad("panel", {1.2, 1.6, 0.2}, {0.6, 0, 0}, {0, 0, 0.6}, panel);
+  room.quad("curtain", {0.2, 0.3, 0.2}, {0, 0, 0.7}, {0, 0.7, 0}, add_curtain(room));
   room.point({0.5, 0.6, 1.5}, {1, 1, 2});
   room.spot(8);
+  room.luminaire(4);
   room.parallel({-0.3, -1, 0.2}, 3);
   room.parallel({0.5, -1, -0.3}, 6, 10);
   if (has_environment) {
@@ -259,6 +261,13 @@ std::vector<EffectRoom> rooms_with_effects() {
     own.lamp();
     own.spot(2);
     rooms.push_back(room("spot", own, {"point", "spot", "interreflection"}, {"occlusion", "color"}));
+  }
+  {
+    Room own;
+    own.closed();
+    own.lamp();
+    own.luminaire(2);
+    rooms.push_back(room("ies", own, {"point", "ies", "interreflection"}, {"occlusion", "color"}));
   }
   {
     Room own;
@@ -361,13 +370,6 @@ std::vector<EffectRoom> rooms_with_effects() {
   {
     Room own;
     own.closed();
-    own.lamp();
-    own.luminaire(2);
-    rooms.push_back(room("ies", own, {"point", "ies", "interreflection"}, {"occlusion", "color"}));
-  }
-  {
-    Room own;
-    own.closed();
     add_screen(own);
     own.point({0.4, 1, 1}, grey(1));
     rooms.push_back(room("two_sided", own, {"point", "occlusion", "interreflection", "two_sided"}, {"color"}));
@@ -376,7 +378,7 @@ std::vector<EffectRoom> rooms_with_effects() {
                                         "directional",       "sun",        "occlusion",
                                         "interreflection",   "color",      "textured_reflectance",
                                         "textured_emission", "alpha_mask", "tint",
-                                        "two_sided"};
+                                        "two_sided",         "ies",        "diffuse_transmission"};
   rooms.push_back({"all", everything(true), all, {}});
   rooms.back().on.push_back("hdri");
   rooms.push_back({"all_with_sky", everything(false), all, {}});

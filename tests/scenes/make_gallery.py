@@ -1,6 +1,7 @@
 """Writes the classic rooms of radiosity as .glb files, without a layout: each calls for other effects of light.
 
   make_gallery.py ROOM OUT.glb        ROOM: goral, simple, computer, vermeer, museum, engine
+  make_gallery.py sky OUT.hdr         for the museum's --hdri: a sky with clouds before noon
 
 goral     a cube with one red and one blue wall under a shining ceiling: convex, nothing hides anything (Goral et al. 1984)
 simple    a table, a chair and a picture under a lamp of area (Wallace, Cohen & Greenberg 1987)
@@ -221,6 +222,18 @@ def picture(width, height, colors, seed):
 PAINTS = [(232, 226, 208), (206, 52, 40), (38, 66, 150), (240, 200, 60), (90, 128, 96), (150, 96, 70)]
 
 
+def framed(room, groups, low, size, bar, deep, material, image):
+    """A picture on the wall z = 0, in a frame of four bars."""
+    (x0, y0), (w, h) = low, size
+    frame, canvas = groups
+    x1, y1 = x0 + w, y0 + h
+    room.block(frame, (x0, y0, 0), (x1, y0 + bar, deep), material, leave_out="back")
+    room.block(frame, (x0, y1 - bar, 0), (x1, y1, deep), material, leave_out="back")
+    for x in (x0, x1 - bar):
+        room.block(frame, (x, y0 + bar, 0), (x + bar, y1 - bar, deep), material, leave_out="back top bottom")
+    room.quad(canvas, (x0 + bar, y0 + bar, deep / 2), (w - 2 * bar, 0, 0), (0, h - 2 * bar, 0), image)
+
+
 def simple():
     room = Room({"plaster": matte(0.76, 0.73, 0.66), "boards": matte(0.5, 0.33, 0.2), "oak": matte(0.42, 0.26, 0.15),
                  "cloth": matte(0.25, 0.4, 0.62), "picture": textured(0), "frame": matte(0.25, 0.16, 0.09),
@@ -229,8 +242,7 @@ def simple():
     table(room, "table", (1.3, 0, 1.5), (2.9, 0.75, 2.4), "oak", "oak")
     chair(room, "chairs", (1.7, 2.75), 0.1, "oak")
     chair(room, "chairs", (2.5, 1.2), math.pi - 0.2, "cloth")
-    room.block("frame", (1.5, 1.15, 0.0), (2.7, 2.05, 0.03), "frame", leave_out="back")
-    room.quad("picture", (1.55, 1.2, 0.032), (1.1, 0, 0), (0, 0.8, 0), "picture")
+    framed(room, ("frame", "picture"), (1.5, 1.15), (1.2, 0.9), 0.05, 0.03, "frame", "picture")
     # The lamp hangs over the table: a disc that shines down under a shade's rim.
     room.turned("lamp rod", (2.1, 2.1, 1.95), lambda t: (0.008, 0.5 * t), 8, 1, "brass")
     room.block("lamp", (1.85, 1.98, 1.7), (2.35, 2.1, 2.2), "brass", leave_out="bottom")
@@ -277,7 +289,7 @@ def computer():
 
 
 def checkers(dark, light):
-    return png(64, 64, lambda x, y: light if (x // 8 + y // 8) % 2 else dark)
+    return png(256, 256, lambda x, y: light if (x // 32 + y // 32) % 2 else dark)
 
 
 def vermeer():
@@ -316,8 +328,7 @@ def vermeer():
     room.block("cloth", (0.98, 0.45, 1.28), (2.0, 0.79, 2.32), "cloth", leave_out="bottom right")
     chair(room, "chair", (3.0, 1.8), math.pi / 2, "oak")
     room.turned("jug", (1.5, 0.79, 1.8), kit.vase_profile, 32, 32, "jug")
-    room.block("frame", (2.2, 1.2, 0), (3.6, 2.2, 0.04), "frame", leave_out="back")
-    room.quad("picture", (2.28, 1.28, 0.042), (1.24, 0, 0), (0, 0.84, 0), "picture")
+    framed(room, ("frame", "picture"), (2.2, 1.2), (1.4, 1.0), 0.08, 0.04, "frame", "picture")
     return room
 
 
@@ -346,8 +357,7 @@ def museum():
             room.block("bars", (x - 0.03, h + 0.3, z0), (x + 0.03, h + 0.38, z1), "bronze", leave_out="front back")
     for k in range(6):
         x = 1.2 + 2.5 * k
-        room.block("frames", (x, 1.3, 0), (x + 1.8, 2.7, 0.05), "frame", leave_out="back")
-        room.quad("pictures", (x + 0.1, 1.4, 0.052), (1.6, 0, 0), (0, 1.2, 0), f"picture {k}")
+        framed(room, ("frames", "pictures"), (x, 1.3), (1.8, 1.4), 0.1, 0.05, "frame", f"picture {k}")
     for k in range(3):
         x = 2.4 + 4.6 * k
         room.block("benches", (x, 0.38, 4.2), (x + 1.8, 0.45, 4.8), "bench")
@@ -393,7 +403,7 @@ def engine():
     # Boilers, their caps and bolts.
     for k in range(3):
         x = 2.2 + 3.8 * k
-        room.turned("boilers", (x, 0, 2.2), lambda t: kit.along_line([(1.0, 0.2), (1.0, 2.4), (0.7, 2.8), (0.0, 2.9)], t), 96, 64,
+        room.turned("boilers", (x, 0, 2.2), lambda t: kit.along_line([(1.0, 0.0), (1.0, 2.4), (0.7, 2.8), (0.0, 2.9)], t), 96, 64,
                     "boiler")
         for bolt in range(24):
             a = 2 * math.pi * bolt / 24
@@ -443,12 +453,46 @@ def engine():
     return room
 
 
+def write_sky(path):
+    """An equirectangular sky of 256 x 128 texels as Radiance RGBE, in units of 1000 nit: blue above, bright clouds, a veiled
+    sun, dark ground below."""
+    width, height = 256, 128
+    rng = random.Random(11)
+    clouds = [(rng.uniform(0, 2 * math.pi), rng.uniform(0.25, 1.2), rng.uniform(0.08, 0.3)) for _ in range(40)]
+    azimuth, elevation = 0.9, 0.85
+    sun = (math.cos(elevation) * math.cos(azimuth), math.sin(elevation), math.cos(elevation) * math.sin(azimuth))
+
+    def radiance(azimuth, elevation):
+        if elevation < 0:
+            return 0.25, 0.24, 0.2
+        up = math.sin(elevation)
+        color = [3.5 - 1.5 * up, 4.6 - 1.2 * up, 6.5 - 0.5 * up]
+        for a, e, size in clouds:
+            apart = math.hypot((azimuth - a + math.pi) % (2 * math.pi) - math.pi, 2 * (elevation - e)) / size
+            share = max(0.0, 1 - apart) ** 0.7
+            color = [c + share * (9.0 - c) for c in color]
+        toward = math.cos(elevation) * math.cos(azimuth) * sun[0] + up * sun[1] + math.cos(elevation) * math.sin(azimuth) * sun[2]
+        glow = 400 * max(0.0, toward) ** 600
+        return tuple(c + g * glow for c, g in zip(color, (1.0, 0.94, 0.82)))
+
+    def rgbe(color):
+        mantissa, exponent = math.frexp(max(color))
+        return bytes([*(min(255, int(c * 256 / 2 ** exponent)) for c in color), exponent + 128])
+    rows = b"".join(rgbe(radiance(2 * math.pi * (x + 0.5) / width, math.pi * (0.5 - (y + 0.5) / height)))
+                    for y in range(height) for x in range(width))
+    with open(path, "wb") as file:
+        file.write(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (height, width) + rows)
+
+
 ROOMS = {"goral": goral, "simple": simple, "computer": computer, "vermeer": vermeer, "museum": museum, "engine": engine}
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("room", choices=sorted(ROOMS))
+    parser.add_argument("room", choices=[*sorted(ROOMS), "sky"])
     parser.add_argument("out", metavar="OUT.glb")
     arguments = parser.parse_args()
-    ROOMS[arguments.room]().write(arguments.out)
+    if arguments.room == "sky":
+        write_sky(arguments.out)
+    else:
+        ROOMS[arguments.room]().write(arguments.out)

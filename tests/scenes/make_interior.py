@@ -155,7 +155,7 @@ class Scene:
             side = unit(cross(forward, (0.3, 1, 0.2) if abs(forward[1]) < 0.9 else (1, 0.2, 0.3)))
             a = 2 * math.pi * t
             return add(here, add(scaled(side, radius * math.cos(a)),
-                                 scaled(cross(side, forward), -radius * math.sin(a))))
+                                 scaled(cross(side, forward), radius * math.sin(a))))
         self.patch(name, f, steps(along), steps(around), material, (metres, 2 * math.pi * radius))
 
     def hoop(self, name, centre, axis_u, axis_v, major, minor, along, around, material):

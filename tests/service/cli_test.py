@@ -401,7 +401,7 @@ class Plans(CliTest):
         plan = self.plan(CORNELL)
         self.assertEqual(list(plan)[0], "effects")
         self.assertEqual([effect["effect"] for effect in plan["effects"]], known)
-        self.assertEqual(len(set(known)), 22)
+        self.assertEqual(len(set(known)), 24)
         for effect in plan["effects"]:
             self.assertIn(effect["state"], ("on", "off", "absent", "unsupported"))
             self.assertTrue(effect["reason"], effect)
@@ -529,7 +529,7 @@ class Plans(CliTest):
         self.assert_exit(result, 0)
         self.assertRegex(result.stderr, r"took .* of CPU time, predicted .* \(.* to .*\), and .* of memory, predicted ")
         report = json.loads((self.place / "out" / "report.json").read_text())
-        self.assertEqual(len(report["plan"]["effects"]), 22)
+        self.assertEqual(len(report["plan"]["effects"]), 24)
         self.assertNotIn("prediction", report["plan"])  # equal bakes have equal plans
         table = report["run"]["predicted_and_actual"]
         self.assertEqual([row["stage"] for row in table["stages"]], ["preparing", "form_factors", "solving", "gathering"])

@@ -180,6 +180,8 @@ std::vector<EffectSeconds> seconds_by_effect(const Preparation& prepared, const 
     const auto backs = static_cast<double>(prepared.patches.size() - prepared.patches.num_cells());
     of(Effect::kTwoSided) = rows * backs / static_cast<double>(prepared.patches.size());
   }
+  // A row and a receiver on the other side.
+  of(Effect::kDiffuseTransmission) = (rows + gather) * survey.area_translucent_m2 / survey.area_m2;
   const double traced = rows + gather;
   of(Effect::kAlphaMask) = kSeeThroughExcess * traced * survey.area_masked_m2 / survey.area_m2;
   of(Effect::kTint) = kSeeThroughExcess * traced * survey.area_tinted_m2 / survey.area_m2;

@@ -120,7 +120,8 @@ class Pilot {
       if (prepared_.patches.is_back(entry.patch)) trial.backs.push_back(entry.patch);
     }
     if (row.counted > 0) {
-      trial.passed_on = mean_component(sample.reflectance) * (1 - (row.escaped + row.absorbed) / row.counted);
+      trial.passed_on = mean_component(sample.reflectance + sample.diffuse_transmittance) *
+                        (1 - (row.escaped + row.absorbed) / row.counted);
     }
     return trial;
   }

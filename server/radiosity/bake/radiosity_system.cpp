@@ -60,18 +60,37 @@ void fill_light(const std::vector<TakenRow>& rows, Vec3 sky, RadiositySystem& sy
   }
 }
 
-/// Lets through what arrives on the other side: direct light here, the rest by the solver.
-void fill_transmission(const Patches& patches, const std::vector<TakenRow>& rows, RadiositySystem& system) {
-  const bool transmits = std::any_of(rows.begin(), rows.end(), [](const TakenRow& taken) {
-    return max_component(taken.sample.diffuse_transmittance) > 0;
-  });
-  if (!transmits) return;
+std::uint32_t other_side_of(const Patches& patches, std::uint32_t patch) {
+  return patches.is_back(patch) ? patches.front_of(patch) : patches.back_of(patch);
+}
+
+bool lets_light_through(const TakenRow& taken) { return max_component(taken.sample.diffuse_transmittance) > 0; }
+
+/// Lets through what arrives on the other side: direct light here, the rest by the solver. Where less of the other side
+/// is open to light than of this one, its flux spreads; where more is, what meets a covered place is lost.
+/// areas: of the open parts [patches].
+void fill_transmission(const Patches& patches, const std::vector<TakenRow>& rows, std::span<const double> areas,
+                       RadiositySystem& system) {
+  if (std::none_of(rows.begin(), rows.end(), lets_light_through)) return;
   RadiosityProblem& problem = system.problem;
   for (std::uint32_t i = 0; i < rows.size(); ++i) {
-    const std::uint32_t other = patches.is_back(i) ? patches.front_of(i) : patches.back_of(i);
+    const std::uint32_t other = other_side_of(patches, i);
+    const bool is_alone = other == kNoPatch || areas[i] <= 0;
+    const double share = is_alone ? 0 : std::min(1.0, areas[other] / areas[i]);
     problem.other_side.push_back(other == kNoPatch ? i : other);
-    problem.transmittance.push_back(other == kNoPatch ? Vec3{} : rows[i].sample.diffuse_transmittance);
+    problem.transmittance.push_back(rows[i].sample.diffuse_transmittance * share);
     problem.source[i] += scaled_by(problem.transmittance[i], system.direct[problem.other_side[i]]);
+  }
+}
+
+/// Both sides of a leaf with holes have one opaque share: the mean of what was sampled on each.
+void agree_on_holes(const Patches& patches, std::vector<TakenRow>& rows) {
+  for (std::uint32_t i = 0; i < patches.num_cells(); ++i) {
+    const std::uint32_t other = other_side_of(patches, i);
+    if (other == kNoPatch || !lets_light_through(rows[i]) || !lets_light_through(rows[other])) continue;
+    double& front = rows[i].sample.opaque_share;
+    double& back = rows[other].sample.opaque_share;
+    front = back = (front + back) / 2;
   }
 }
 
@@ -224,12 +243,13 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
       on_row, stop);
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   fill_light(rows, surfaces.sky, *system);
-  fill_transmission(patches, rows, *system);
+  agree_on_holes(patches, rows);
   warn_of_backs(prepared, rows, system->warnings);
   warn_of_uncertain_rows(rows, system->warnings);
 
   // Put the operator together.
   EstimatedRows estimated = collected(patches, surfaces.metres_per_unit * surfaces.metres_per_unit, rows);
+  fill_transmission(patches, rows, estimated.areas, *system);
   if (is_streamed) {
     system->transport = make_streamed(estimated, rows, prepared.plan.solver, *system, stop);
     return system;

@@ -21,10 +21,12 @@ EnergyBalance audit_energy(const TransportOperator& transport, const EnergyTerms
     // By reciprocity, A_i B'_i (1 - row sum) is what meets no patch.
     leaving += areas[i] * own * (1 - transport.row_sum(i));
     glow += areas[i] * mean_component(terms.glow[i]);
-    // Of what arrives here, tau of the other side leaves there.
-    Vec3 kept = Vec3{1, 1, 1} - terms.problem.reflectance[i];
-    if (terms.problem.transmits()) kept -= terms.problem.transmittance[terms.problem.other_side[i]];
-    absorbed += areas[i] * mean_component(scaled_by(kept, irradiance));
+    absorbed += areas[i] * mean_component(scaled_by(Vec3{1, 1, 1} - terms.problem.reflectance[i], irradiance));
+    if (terms.problem.transmits()) {
+      // Of what arrives here, tau of the other side leaves there.
+      const std::uint32_t other = terms.problem.other_side[i];
+      absorbed -= areas[other] * mean_component(scaled_by(terms.problem.transmittance[other], irradiance));
+    }
     direct += areas[i] * mean_component(terms.direct[i]);
     variance += areas[i] * areas[i] * terms.direct_variances[i];
   }

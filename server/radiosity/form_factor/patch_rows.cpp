@@ -139,8 +139,11 @@ std::vector<std::uint8_t> find_reached_backs(const Surfaces& surfaces, const Pat
         sites.push_back(side_site(surfaces, p, patches.normal(patch, p, surfaces)));
       }
       // Light that meets a back which lets it through lights the front.
-      const std::uint32_t triangle = patches.pieces(patches.front_of(patch)).front().triangle;
-      if (surfaces.is_translucent(triangle)) reached[patch] = 1;
+      const auto pieces = patches.pieces(patches.front_of(patch));
+      if (std::any_of(pieces.begin(), pieces.end(),
+                      [&](const auto& piece) { return surfaces.is_translucent(piece.triangle); })) {
+        reached[patch] = 1;
+      }
       estimator.sample_row(sites, seed, scratch, row);
       for (const std::uint32_t other : row.arrivals) {
         if (other < num_fronts) {

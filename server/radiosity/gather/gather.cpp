@@ -134,7 +134,7 @@ bool LightmapGather::gather_alone(const GatherPass& pass, const GatherScene& sce
                            : std::min(samples, kSamplesPerSite * static_cast<int>(scratch.receive.sites.size()));
   const Reception reception = receive(scene, receiver, seed_of(scene.seed, kRaysOfTexel, id),
                                       seed_of(scene.seed, kLightOfTexel, id), scratch.receive, of_sites);
-  if (facts.parts == Receiver::Parts::kOne && receiver.parts == Receiver::Parts::kSeveral) estimate_.forget(id);
+  if (receiver.turned_out_cut(facts.parts, facts.parts_behind)) estimate_.forget(id);
   facts.parts = receiver.parts;
   facts.parts_behind = receiver.parts_behind;
   scratch.counts.num_rays += reception.rays;

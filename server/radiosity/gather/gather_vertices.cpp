@@ -113,7 +113,7 @@ void VertexGather::add_pass(const GatherScene& scene, int light_samples, double 
       }
       const Reception reception = receive(scene, receiver, seed_of(scene.seed, kRaysOfVertex, g),
                                           seed_of(scene.seed, kLightOfVertex, g), scratch.receive, light_samples);
-      if (parts_[g] == Receiver::Parts::kOne && receiver.parts == Receiver::Parts::kSeveral) estimate_.forget(g);
+      if (receiver.turned_out_cut(parts_[g], parts_behind_[g])) estimate_.forget(g);
       parts_[g] = receiver.parts;
       parts_behind_[g] = receiver.parts_behind;
       num_rays += reception.rays;

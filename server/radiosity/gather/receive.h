@@ -80,6 +80,12 @@ struct Receiver {
   std::function<Site(double u, double v)> site_at;
   Parts parts = Parts::kUnknown;  ///< receive() finds out
   Parts parts_behind = Parts::kUnknown;
+
+  /// Whether either side was one part and is several now: what was gathered before is of all of them.
+  bool turned_out_cut(Parts before, Parts behind_before) const {
+    return (before == Parts::kOne && parts == Parts::kSeveral) ||
+           (behind_before == Parts::kOne && parts_behind == Parts::kSeveral);
+  }
 };
 
 /// Gathers the light at scratch.sites, which are spread over one receiver; each replicate has its share of them, in

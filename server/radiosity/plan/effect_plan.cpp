@@ -41,6 +41,7 @@ class EffectPlanner {
   Result<std::vector<EffectPlan>> plan() {
     decide(Effect::kAlphaMask, alpha_mask());
     decide(Effect::kTint, tint());
+    decide(Effect::kTwoSided, two_sided());
     decide(Effect::kDiffuseTransmission, diffuse_transmission());
     // Light from outside enters where there is an opening, a hole or a sheet.
     is_sealed_ = survey_.is_closed && !is_on(Effect::kAlphaMask) && !is_on(Effect::kTint);
@@ -57,7 +58,6 @@ class EffectPlanner {
     decide(Effect::kColor, color());
     decide(Effect::kTexturedReflectance, textured_reflectance());
     decide(Effect::kTexturedEmission, textured_emission());
-    decide(Effect::kTwoSided, two_sided());
     decide(Effect::kVertices, output(asked_.vertices, "light by vertex"));
     decide(Effect::kLayers, output(asked_.layers, "layers of direct or indirect light"));
     decide(Effect::kAmbientOcclusion, output(asked_.ambient_occlusion, "ambient occlusion"));
@@ -115,6 +115,7 @@ class EffectPlanner {
 
   Decision diffuse_transmission() const {
     if (survey_.area_translucent_m2 <= 0) return absent("no material lets light through scattered");
+    if (!is_on(Effect::kTwoSided)) return off("backs are not simulated");
     return on("light goes scattered through " + area(survey_.area_translucent_m2),
               survey_.area_translucent_m2 / survey_.area_m2);
   }
@@ -190,7 +191,9 @@ class EffectPlanner {
   Decision interreflection() const {
     if (survey_.max_reflectance <= 0) return off("no surface reflects");
     if (survey_.is_exposed) return off(exposed(), static_cast<double>(survey_.num_triangles));
-    return on("surfaces reflect up to " + number(100 * survey_.max_reflectance) + " %", survey_.max_reflectance);
+    return on((survey_.area_translucent_m2 > 0 ? "surfaces send on up to " : "surfaces reflect up to ") +
+                  number(100 * survey_.max_reflectance) + " %",
+              survey_.max_reflectance);
   }
 
   Decision color() const {
@@ -202,7 +205,7 @@ class EffectPlanner {
     const VariationFacts& facts = survey_.varying_reflectance;
     if (facts.num == 0) return absent("no texture or vertex colour of reflectance");
     if (facts.num_flat == facts.num) return off(flat(facts), static_cast<double>(facts.num));
-    if (!is_on(Effect::kInterreflection) && !is_on(Effect::kTint)) {
+    if (!is_on(Effect::kInterreflection) && !is_on(Effect::kTint) && !is_on(Effect::kDiffuseTransmission)) {
       return off("no reflected light is simulated", static_cast<double>(facts.num));
     }
     return on(varying(facts), static_cast<double>(facts.num - facts.num_flat));
@@ -252,6 +255,9 @@ class EffectPlanner {
       }
       if (is_on && plan.state == EffectState::kAbsent) {
         return invalid_argument(name + " cannot be forced on: " + plan.reason);
+      }
+      if (is_on && effect == Effect::kDiffuseTransmission && !this->is_on(Effect::kTwoSided)) {
+        return invalid_argument(name + " cannot be forced on: 'two_sided' is forced off");
       }
       if (!is_on && effect == Effect::kVertices && plan.is_forced && !asked_.lightmaps) {
         return invalid_argument(name + " cannot be forced off: nothing else is put out");

@@ -19,7 +19,7 @@ class LargestKey {
   std::uint32_t largest() const;
   double key(std::uint32_t i) const { return keys_[i]; }
 
-  /// Preconditions: indices ascending, each below n; keys >= 0, not NaN.
+  /// Fastest where indices ascend. Preconditions: each below n, none twice; keys >= 0, not NaN.
   void set(std::span<const std::uint32_t> indices, std::span<const double> keys);
 
  private:

@@ -19,8 +19,8 @@ namespace radbake::radiosity {
 /// Shapes: all [n], or empty.
 template <Channels C>
 struct ProblemOf {
-  std::vector<C> source;       ///< each channel >= 0
-  std::vector<C> reflectance;  ///< each channel in [0, 1)
+  std::vector<C> source;                       ///< each channel >= 0
+  std::vector<C> reflectance;                  ///< each channel in [0, 1)
   std::vector<C> transmittance = {};           ///< tau_i, of what arrives on the other side; rho_i + tau_i < 1
   std::vector<std::uint32_t> other_side = {};  ///< opp(i); i itself where there is none, and tau_i is 0 then
 

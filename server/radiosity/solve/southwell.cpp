@@ -76,7 +76,7 @@ void solve_by_southwell(SolveMonitor<C>& monitor, std::vector<C>& radiosity) {
         }
         largest->set(others, keys);
       }
-      if (max_component(own_share) == 0) {
+      if (own_factor == 0) {
         // The patch does not see itself, so its column may leave it out.
         constexpr double kNone = 0;
         residuals[i] = {};

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "server/radiosity/survey/survey.h"
+#include "server/radiosity/survey/texture.h"
 
 namespace radbake::radiosity {
 
@@ -43,6 +44,12 @@ bool is_watertight(const Surfaces& surfaces);
 inline bool is_opaque_in_fact(const Material& material, double least_opacity) {
   const double least = material.alpha * least_opacity;
   return material.alpha_mode == AlphaMode::kMask ? least >= material.alpha_cutoff : least >= 1;
+}
+
+/// Whether light goes through a material scattered: its texture may be black.
+inline bool is_translucent_in_fact(const Material& material, const Scene& scene) {
+  return max_component(
+             scaled_by(material.diffuse_transmittance, brightest(scene, material.diffuse_transmittance_texture))) > 0;
 }
 
 /// Fills in what materials, textures and vertex colours tell. Everything is simulated in `surfaces`.

@@ -140,6 +140,10 @@ class MaterialFacts {
 void find_material_facts(const Surfaces& surfaces, Survey& survey) {
   const MaterialFacts facts(surfaces, survey);
   const std::vector<bool> passes = facts.passes_by_alpha();
+  std::vector<bool> is_translucent;
+  for (const Material& material : surfaces.scene->materials) {
+    is_translucent.push_back(is_translucent_in_fact(material, *surfaces.scene));
+  }
   const double square_metres = surfaces.metres_per_unit * surfaces.metres_per_unit;
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
     const int index = surfaces.mesh(t).material;
@@ -147,7 +151,7 @@ void find_material_facts(const Surfaces& surfaces, Survey& survey) {
     const double area = surfaces.areas[t] * square_metres;
     survey.area_masked_m2 += passes[static_cast<std::size_t>(index)] ? area : 0;
     survey.area_tinted_m2 += max_component(material.transmittance) > 0 ? area : 0;
-    survey.area_translucent_m2 += max_component(material.diffuse_transmittance) > 0 ? area : 0;
+    survey.area_translucent_m2 += is_translucent[static_cast<std::size_t>(index)] ? area : 0;
     survey.area_double_sided_m2 += material.is_double_sided ? area : 0;
     survey.area_specular_m2 += material.is_specular ? area : 0;
     survey.area_refractive_m2 += material.is_refractive ? area : 0;

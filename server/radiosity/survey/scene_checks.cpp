@@ -117,29 +117,20 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
     }
   }
   // The product of factor and texture must send on less than it gets, everywhere.
-  const auto brightest_of = [&scene](const std::optional<TextureReference>& reference) {
-    if (!reference) return Vec3{1, 1, 1};
-    const TexturePlane& texture = scene.textures[reference->texture];
-    Vec3 brightest;
-    for (std::size_t at = 0; at + 2 < texture.values.size(); at += texture.channels) {
-      for (int c = 0; c < 3; ++c) brightest[c] = std::fmax(brightest[c], texture.values[at + c]);
-    }
-    return brightest;
-  };
-  const Vec3 both_sides =
-      scaled_by(material.reflectance, brightest_of(material.reflectance_texture)) +
-      scaled_by(material.diffuse_transmittance, brightest_of(material.diffuse_transmittance_texture));
-  if (max_component(material.diffuse_transmittance) > 0 && max_component(both_sides) >= 1) {
-    return invalid_argument(name + ": reflectance and diffuse transmittance times their textures reach " +
-                            in_words(both_sides) + ", not below 1");
+  const Vec3 base = brightest(scene, material.reflectance_texture);
+  const Vec3 in_all = scaled_by(passed_on, base) + scaled_by(material.diffuse_transmittance,
+                                                             brightest(scene, material.diffuse_transmittance_texture));
+  if (max_component(material.diffuse_transmittance) > 0 && max_component(in_all) >= 1) {
+    return invalid_argument(name +
+                            ": reflectance, transmittance and diffuse transmittance, with their textures, reach " +
+                            in_words(in_all) + ", not below 1");
   }
   if (material.reflectance_texture) {
-    const Vec3 brightest = brightest_of(material.reflectance_texture);
-    const Vec3 product = scaled_by(material.reflectance, brightest);
+    const Vec3 product = scaled_by(material.reflectance, base);
     if (max_component(product) >= 1) {
       return invalid_argument(name + ": reflectance times texture reaches " + in_words(product) + ", not below 1");
     }
-    const Vec3 both = scaled_by(passed_on, brightest);
+    const Vec3 both = scaled_by(passed_on, base);
     if (max_component(both) > 1 + kRounding) {
       return invalid_argument(name + ": reflectance + transmittance times texture reaches " + in_words(both) +
                               ", above 1");

@@ -57,7 +57,10 @@ void Surfaces::simulate(const EffectSet& set) {
     if (!set.has(Effect::kAlphaMask) || stops_all(material, *scene)) material.alpha_mode = AlphaMode::kOpaque;
     if (!set.has(Effect::kTint)) material.transmittance = {};
     // Through what has no back nothing comes.
-    if (!set.has(Effect::kDiffuseTransmission) || !set.has(Effect::kTwoSided)) material.diffuse_transmittance = {};
+    if (!set.has(Effect::kDiffuseTransmission) || !set.has(Effect::kTwoSided) ||
+        !is_translucent_in_fact(material, *scene)) {
+      material.diffuse_transmittance = {};
+    }
     if (!set.has(Effect::kTwoSided)) material.is_double_sided = false;
   }
   lights.clear();
@@ -77,7 +80,10 @@ void Surfaces::simulate(const EffectSet& set) {
       const auto reflectance_at = [this](const SurfacePoint& p) { return reflectance(p); };
       means[t] = varies ? mean_over(t, points, reflectance_at) : reflectance({t, 0, 0});
       const auto through_at = [this](const SurfacePoint& p) { return diffuse_transmittance(p); };
-      through[t] = material(t).diffuse_transmittance_texture ? mean_over(t, points, through_at) : through_at({t, 0, 0});
+      // What passes a tinted sheet straight is textured as its reflectance, and leaves the rest.
+      const bool rest_varies = material(t).reflectance_texture && max_component(material(t).transmittance) > 0;
+      through[t] = material(t).diffuse_transmittance_texture || rest_varies ? mean_over(t, points, through_at)
+                                                                            : through_at({t, 0, 0});
     }
     mean_reflectances = std::move(means);
     mean_diffuse_transmittances = std::move(through);

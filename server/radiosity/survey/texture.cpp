@@ -55,4 +55,16 @@ double least_opacity(const TexturePlane& texture) {
   return least;
 }
 
+Vec3 brightest(const Scene& scene, const std::optional<TextureReference>& use) {
+  if (!use) return {1, 1, 1};
+  const TexturePlane& texture = scene.textures[static_cast<std::size_t>(use->texture)];
+  Vec3 most;
+  for (std::size_t at = 0; at + 2 < texture.values.size(); at += static_cast<std::size_t>(texture.channels)) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      most[static_cast<int>(c)] = std::max<double>(most[static_cast<int>(c)], texture.values[at + c]);
+    }
+  }
+  return most;
+}
+
 }  // namespace radbake::radiosity

@@ -14,4 +14,7 @@ double sampled_opacity(const TexturePlane& texture, Vec2 uv);
 /// The least of its texels' fourth channel; 1 without one.
 double least_opacity(const TexturePlane& texture);
 
+/// The largest value of each colour channel; 1 without a texture.
+Vec3 brightest(const Scene& scene, const std::optional<TextureReference>& use);
+
 }  // namespace radbake::radiosity

@@ -272,6 +272,18 @@ TEST(GltfMaterials, LimitsTheProductOfFactorAndVertexColour) {
   EXPECT_THAT(warning_text(scene, "reflectance_limited"), HasSubstr("'grey' (50 %"));
 }
 
+TEST(GltfMaterials, LimitsVertexColoursOfALeafAsThoseOfOtherMaterials) {
+  GltfBuilder file = colored({0.25f, 0.5f, 1, 1, 0.5f, 0.5f, 0.5f, 1, 0.5f, 0.5f, 0.5f, 1, 0.5f, 0.5f, 0.5f, 1});
+  material(file)["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 1};
+  material(file)["extensions"]["KHR_materials_diffuse_transmission"] = {{"diffuseTransmissionFactor", 0.5}};
+  const GltfScene scene = read(file, 0.8);
+  const Vec3 product = scaled_by(scene.scene.materials[0].reflectance, scene.scene.meshes.at(0).colors[0]);
+  EXPECT_DOUBLE_EQ(product.x, 0.125);
+  EXPECT_DOUBLE_EQ(product.y, 0.25);
+  EXPECT_DOUBLE_EQ(product.z, 0.4);
+  EXPECT_DOUBLE_EQ(scene.scene.materials[0].diffuse_transmittance.x, 0.4);
+}
+
 TEST(GltfMaterials, LimitsVertexColoursToOneAndSaysWhatItLeavesOut) {
   GltfBuilder file = colored({3, 0.5f, -1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0.5f});
   const GltfScene scene = read(file);

@@ -368,6 +368,7 @@ Scene room_of_everything() {
   scene.meshes[0].material = 1;
   scene.materials[0].reflectance = {0.5, 0.4, 0.3};
   scene.materials[0].is_double_sided = true;
+  scene.materials[0].diffuse_transmittance = {0.1, 0.2, 0.3};
   scene.materials[0].alpha_mode = AlphaMode::kMask;
   use_texture(scene, pair_of_texels(kGrey, kHole), &Material::reflectance_texture);
   scene.materials[1].emissive = {1, 1, 1};
@@ -375,6 +376,9 @@ Scene room_of_everything() {
   scene.textures.push_back(pair_of_texels(kBlack, kGrey));
   scene.materials[1].emissive_texture = scene.materials[1].reflectance_texture = TextureReference{1, 0};
   scene.lights.push_back({"spot", SpotLight{{2, 1.5, 2.5}, {0, -1, 0}, {9, 9, 9}, 0.1, 0.5}});
+  ProfileLight luminaire{
+      .position = {2, 1.5, 2.5}, .direction = {0, -1, 0}, .zero_side = {1, 0, 0}, .profile = {{0, 90}, {0}, {9, 9}}};
+  scene.lights.push_back({"luminaire", luminaire});
   scene.lights.push_back({"parallel", straight_down(0)});
   scene.lights.push_back({"sun", straight_down(0.01)});
   scene.sky = {1, 1, 1};
@@ -386,7 +390,7 @@ TEST(EffectPlan, TurnsEverythingOnThatASceneHas) {
   const auto plan = planned(scene, {true, true, true, true}).value();
   EXPECT_THAT(names_in(plan, EffectState::kAbsent),
               ElementsAreArray({"hdri", "specular", "refraction", "normal_map", "volume"}));
-  EXPECT_EQ(names_in(plan, EffectState::kOn).size(), 17u);
+  EXPECT_EQ(names_in(plan, EffectState::kOn).size(), 19u);
   scene.environment = environment(1);
   scene.sky = {};
   EXPECT_THAT(names_in(planned(scene).value(), EffectState::kAbsent),
@@ -452,6 +456,22 @@ TEST(EffectPlan, FollowsFromAnOverrideWhatItDoesToOtherEffects) {
   EXPECT_EQ(of(planned(scene).value(), Effect::kTexturedReflectance).state, EffectState::kOn);
   const auto dark = planned(scene, {}, {{Effect::kInterreflection, false}}).value();
   EXPECT_EQ(of(dark, Effect::kTexturedReflectance).state, EffectState::kOff);
+}
+
+// What goes through scattered needs backs, and mixes two textured colours even where nothing is reflected.
+TEST(EffectPlan, TurnsDiffuseTransmissionOffWithBacks) {
+  Scene scene = lit_room();
+  scene.materials[0].is_double_sided = true;
+  scene.materials[0].diffuse_transmittance = {0.25, 0.25, 0.25};
+  use_texture(scene, pair_of_texels(kBlack, kGrey), &Material::diffuse_transmittance_texture);
+  const auto single = planned(scene, {}, {{Effect::kTwoSided, false}}).value();
+  EXPECT_EQ(of(single, Effect::kDiffuseTransmission).state, EffectState::kOff);
+  EXPECT_FALSE(planned(scene, {}, {{Effect::kTwoSided, false}, {Effect::kDiffuseTransmission, true}}).ok());
+  const auto dark = planned(scene, {}, {{Effect::kInterreflection, false}}).value();
+  EXPECT_EQ(of(dark, Effect::kTexturedReflectance).state, EffectState::kOn);
+  // Black in fact.
+  scene.textures = {pair_of_texels(kBlack, kBlack)};
+  EXPECT_EQ(of(planned(scene).value(), Effect::kDiffuseTransmission).state, EffectState::kAbsent);
 }
 
 TEST(EffectPlan, RefusesOverridesThatContradictTheScene) {

@@ -92,6 +92,13 @@ INSTANTIATE_TEST_SUITE_P(
                   s.materials[0].transmittance = {0.5, 0.51, 0.5};
                 },
                 "reflectance + transmittance reaches (1, 1.01, 1), above 1"},
+        Refusal{"SendsOnMoreThanAllOnBothSides",
+                [](Scene& s) {
+                  s.materials[0].is_double_sided = true;
+                  s.materials[0].reflectance = {0.4, 0.4, 0.4};
+                  s.materials[0].transmittance = s.materials[0].diffuse_transmittance = {0.25, 0.5, 0.25};
+                },
+                "reflectance, transmittance and diffuse transmittance, with their textures, reach (0.9, 1.4, 0.9)"},
         Refusal{"TextureTimesBothTooBright",
                 [](Scene& s) {
                   s.textures.push_back({"snow", 1, 1, 3, Wrap::kRepeat, Wrap::kRepeat, {1.5f, 1.5f, 1.5f}});

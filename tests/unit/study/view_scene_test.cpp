@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <numbers>
 
 namespace radbake::study {
@@ -76,6 +77,29 @@ TEST(View, ShowsWhatEmitsAndTheBackground) {
   EXPECT_NEAR(pixel(picture, 2, 2).y, 2, 1e-6);
 }
 
+// From behind, a single-sided wall is not there, and what stands beyond it is.
+TEST(View, LooksThroughBacks) {
+  const auto from_behind = [](const BakedScene& baked) {
+    Camera camera;
+    camera.eye = {0, 0, -2.5};
+    camera.fov_degrees = 90;
+    return pixel(render_view(baked, camera, {.width = 50, .height = 50, .background = {1, 2, 3}}).value(), 25, 25);
+  };
+  BakedScene baked = painted_wall();
+  EXPECT_NEAR(from_behind(baked).y, 2, 1e-6);
+  Mesh lamp = baked.scene.meshes[0];
+  for (Vec3& p : lamp.positions) p = {-p.x, p.y, 3};
+  lamp.material = 1;
+  Material glow;
+  glow.emissive = {7, 8, 9};
+  baked.scene.materials.push_back(glow);
+  baked.scene.meshes.push_back(lamp);
+  baked.lightmap_of_mesh.push_back(-1);
+  EXPECT_NEAR(from_behind(baked).y, 8, 8 * kSinglePrecision);
+  baked.scene.materials[0].is_double_sided = true;
+  EXPECT_LT(from_behind(baked).z, 8);
+}
+
 TEST(View, RefusesACameraThatLooksNowhere) {
   Camera camera;
   EXPECT_FALSE(render_view(painted_wall(), camera, {}).ok());
@@ -99,6 +123,18 @@ TEST(View, DevelopsByTheBrightestParts) {
   for (const std::uint8_t value : developed(luminance, 0.4)) EXPECT_EQ(value, 255);
   luminance.values.assign(60, 0.0F);
   for (const std::uint8_t value : developed(luminance, 0)) EXPECT_EQ(value, 0);
+}
+
+TEST(View, RefusesADocumentThatIsNotOne) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "radbake_view";
+  std::filesystem::create_directories(folder);
+  for (const char* text : {"[]", "{\"lightmaps\": 3, \"meshes\": []}", "{\"lightmaps\": [3], \"meshes\": []}",
+                           "{\"lightmaps\": [{\"files\": [4, {\"encoding\": 5}]}], \"meshes\": [6]}"}) {
+    std::ofstream(folder / "lightmaps.json") << text;
+    const auto baked = read_baked_scene(folder);
+    ASSERT_FALSE(baked.ok());
+    EXPECT_NE(baked.error().message.find("lightmaps.json"), std::string::npos) << baked.error().message;
+  }
 }
 
 TEST(View, NamesTheFileThatIsMissing) {

@@ -47,8 +47,8 @@ std::vector<std::string> unset_fields(const Message& message) {
 
 radiosity::BakePlan full_plan() {
   radiosity::BakePlan plan;
-  plan.survey = {1,    2,    3,    4,    5,    6,  7,    8,    9,    10.5, 11.5, 0.5,  13.5, true, 0.25, 16,
-                 true, true, true, 0.75, 0.01, 22, 23.5, 24.5, 25.5, 26.5, 27.5, 28.5, 29.5, 30,   31.5, {"lamp"}};
+  plan.survey = {1,    2,    3,    4,    5,  6,    7,    8,    9,    10.5, 11.5, 0.5,  13.5, true, 0.25, 16,      true,
+                 true, true, 0.75, 0.01, 22, 23.5, 24.5, 25.5, 26.5, 27.5, 28.5, 29.5, 30.5, 31,   32.5, {"lamp"}};
   plan.atlas_size = 14;
   plan.num_texels = 15;
   plan.num_patches = 16;

@@ -14,5 +14,6 @@ inline constexpr std::uint64_t kMaxCount = 150'000'000;                 ///< ele
 inline constexpr std::uint64_t kMaxUnbackedElements = 1'000'000;        ///< of an accessor without a buffer view
 inline constexpr std::uint64_t kMaxSceneTriangles = 50'000'000;         ///< with all instances placed
 inline constexpr std::uint64_t kMaxSceneVertices = 50'000'000;          ///< with all instances placed
+inline constexpr std::uint64_t kMaxSceneIesBytes = std::uint64_t{64} << 20;  ///< of all luminaires' files together
 
 }  // namespace radbake::gltf

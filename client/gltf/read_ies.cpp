@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <sstream>
 #include <string>
 
 #include "client/gltf/entry.h"
@@ -78,22 +81,57 @@ Result<Body> find_body(std::string_view text) {
   return invalid_argument("it has no TILT line: it is no IES file");
 }
 
+/// Up to the standard of 1995 the second number beside the ballast factor multiplies as well. In 2002 it has no meaning
+/// yet; in 2019 it is the kind of the file. The first line names the standard, and in 1986 there was no such line.
+bool has_lamp_factor(std::string_view text) {
+  std::string_view line = text.substr(0, text.find('\n'));
+  constexpr std::string_view kStandard = "LM-63-";
+  const std::size_t at = line.find(kStandard);
+  if (at == std::string_view::npos) return true;
+  line.remove_prefix(at + kStandard.size());
+  int year = 0;
+  std::from_chars(line.data(), line.data() + line.size(), year);
+  if (year < 100) year += year < 86 ? 2000 : 1900;
+  return year <= 1995;
+}
+
+struct Row {
+  double degrees;
+  std::vector<float> candela;
+};
+
+/// The row at 180 degrees, from its neighbours where it was not measured. rows: ascending from 90 to 270.
+void add_middle(std::vector<Row>& rows) {
+  const auto next = std::find_if(rows.begin(), rows.end(), [](const Row& row) { return row.degrees >= 180; });
+  if (next->degrees == 180) return;
+  const Row& before = *(next - 1);
+  const double share = (180 - before.degrees) / (next->degrees - before.degrees);
+  Row middle{180, {}};
+  for (std::size_t v = 0; v < before.candela.size(); ++v) {
+    middle.candela.push_back(static_cast<float>(std::lerp(double{before.candela[v]}, double{next->candela[v]}, share)));
+  }
+  rows.insert(next, std::move(middle));
+}
+
+bool is_folded(const LightProfile& profile) {
+  const std::vector<double>& angles = profile.horizontal_degrees;
+  return angles.front() == 90 && angles.back() == 270 &&
+         std::adjacent_find(angles.begin(), angles.end(), std::greater_equal<>()) == angles.end();
+}
+
 /// Angles from 90 to 270 mirror the plane through both: the same all around.
 void unfold(LightProfile& profile) {
   const std::size_t num = profile.vertical_degrees.size();
-  struct Row {
-    double degrees;
-    std::vector<float> candela;
-  };
   std::vector<Row> rows;
   for (std::size_t h = 0; h < profile.horizontal_degrees.size(); ++h) {
     const auto first = profile.candela.begin() + static_cast<std::ptrdiff_t>(h * num);
-    const std::vector<float> values(first, first + static_cast<std::ptrdiff_t>(num));
-    const double degrees = profile.horizontal_degrees[h], mirrored = degrees <= 180 ? 180 - degrees : 540 - degrees;
-    rows.push_back({degrees, values});
-    rows.push_back({mirrored, values});
-    if (mirrored == 0) rows.push_back({360, values});
-    if (mirrored == 360) rows.push_back({0, values});
+    rows.push_back({profile.horizontal_degrees[h], {first, first + static_cast<std::ptrdiff_t>(num)}});
+  }
+  add_middle(rows);  // its image closes the circle
+  for (std::size_t h = 0, measured = rows.size(); h < measured; ++h) {
+    const Row row = rows[h];
+    rows.push_back({row.degrees <= 180 ? 180 - row.degrees : 540 - row.degrees, row.candela});
+    if (row.degrees == 180) rows.push_back({360, row.candela});
   }
   std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.degrees < b.degrees; });
   rows.erase(std::unique(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.degrees == b.degrees; }),
@@ -133,19 +171,26 @@ Result<LightProfile> read_ies(std::string_view text) {
                                                     : std::to_string(type)) +
                             ": only type C (1) is read");
   }
+  RADBAKE_RETURN_IF_ERROR(check_profile_size(num_vertical, num_horizontal));
   RADBAKE_RETURN_IF_ERROR(numbers.skip(4, "the size of the opening"));
-  for (const char* what : {"the ballast factor", "the ballast-lamp factor"}) {
-    RADBAKE_ASSIGN_OR_RETURN(const double ballast, numbers.next(what));
-    factor *= ballast;
-  }
+  RADBAKE_ASSIGN_OR_RETURN(const double ballast_factor, numbers.next("the ballast factor"));
+  RADBAKE_ASSIGN_OR_RETURN(const double lamp_factor, numbers.next("the number after the ballast factor"));
+  factor *= has_lamp_factor(text) ? ballast_factor * lamp_factor : ballast_factor;
   RADBAKE_RETURN_IF_ERROR(numbers.skip(1, "the watts"));
   LightProfile profile;
   RADBAKE_ASSIGN_OR_RETURN(profile.vertical_degrees, numbers.next_list(num_vertical, "vertical angle"));
   RADBAKE_ASSIGN_OR_RETURN(profile.horizontal_degrees, numbers.next_list(num_horizontal, "horizontal angle"));
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<double> candela,
                            numbers.next_list(num_vertical * num_horizontal, "intensity"));
-  for (const double value : candela) profile.candela.push_back(static_cast<float>(factor * value));
-  if (profile.horizontal_degrees.front() == 90 && profile.horizontal_degrees.back() == 270) unfold(profile);
+  for (const double value : candela) {
+    if (!(std::fabs(factor * value) <= std::numeric_limits<float>::max())) {
+      std::ostringstream message;
+      message << "intensity " << value << " times " << factor << " cd is beyond single precision";
+      return invalid_argument(message.str());
+    }
+    profile.candela.push_back(static_cast<float>(factor * value));
+  }
+  if (is_folded(profile)) unfold(profile);
   RADBAKE_RETURN_IF_ERROR(check_profile(profile));
   return profile;
 }

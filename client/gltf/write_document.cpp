@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
 #include "client/gltf/check_document.h"
 #include "client/gltf/container.h"
+#include "client/gltf/limits.h"
 #include "client/gltf/load_model.h"
+#include "client/gltf/read_lights.h"
 
 namespace radbake::gltf {
 namespace {
@@ -111,7 +114,28 @@ Result<Document> Document::load(const std::filesystem::path& path) {
     image["mimeType"] = media_type;
     image["bufferView"] = document.add_view(bytes, 0, 0);
   }
+  document.load_profiles(path.parent_path());
   return document;
+}
+
+void Document::load_profiles(const std::filesystem::path& folder) {
+  const auto list = "/extensions/EXT_lights_ies/lights"_json_pointer;
+  if (!json.contains(list)) return;
+  std::map<std::string, std::size_t> view_of;
+  std::uint64_t num_bytes = 0;
+  for (OrderedJson& profile : json[list]) {
+    if (!profile.contains("uri")) continue;
+    const std::string uri = profile["uri"].get<std::string>();
+    if (!view_of.contains(uri)) {
+      const Result<std::string> bytes = read_ies_uri(folder, uri);
+      if (!bytes.ok() || bytes->empty() || num_bytes + bytes->size() > kMaxSceneIesBytes) continue;
+      num_bytes += bytes->size();
+      view_of[uri] = add_view(*bytes, 0, 0);
+    }
+    profile.erase("uri");
+    profile["mimeType"] = "application/x-ies-lm-63";
+    profile["bufferView"] = view_of[uri];
+  }
 }
 
 std::string_view Document::view_bytes(std::size_t view) const {

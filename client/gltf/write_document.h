@@ -18,8 +18,8 @@ class Document {
  public:
   OrderedJson json;
 
-  /// Reads, checks and loads a file; images of other files and data URIs move into the chunk.
-  /// An image that is missing, or of a kind that is not known, keeps its URI.
+  /// Reads, checks and loads a file; images and light profiles of other files and data URIs move into the chunk.
+  /// One that is missing, or an image of a kind that is not known, keeps its URI.
   /// Errors: kInvalidArgument, as read_gltf().
   static Result<Document> load(const std::filesystem::path& path);
 
@@ -44,6 +44,7 @@ class Document {
   Result<void> write(const std::filesystem::path& path);
 
  private:
+  void load_profiles(const std::filesystem::path& folder);
   std::size_t add_view(const std::string& bytes, int target, std::size_t stride);
 
   std::string bin_;

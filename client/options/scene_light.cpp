@@ -23,7 +23,7 @@ Vec3 strength(const Light& light) {
         if constexpr (requires { kind.illuminance; }) {
           return kind.illuminance;
         } else if constexpr (requires { kind.profile; }) {
-          return kind.tint * kind.profile.lumens();
+          return kind.tint * kind.profile->lumens();
         } else {
           return kind.intensity;
         }

@@ -23,6 +23,8 @@ Result<void> check_counts(const v1::SceneManifest& manifest, const v1::Limits& l
   RADBAKE_RETURN_IF_ERROR(check_limit(manifest.meshes_size(), "meshes", limits.max_meshes(), "max_meshes"));
   RADBAKE_RETURN_IF_ERROR(check_limit(manifest.textures_size(), "textures", limits.max_textures(), "max_textures"));
   RADBAKE_RETURN_IF_ERROR(check_limit(manifest.lights_size(), "lights", limits.max_lights(), "max_lights"));
+  RADBAKE_RETURN_IF_ERROR(
+      check_limit(manifest.light_profiles_size(), "light profiles", limits.max_lights(), "max_lights"));
   std::uint64_t num_vertices = 0, num_triangles = 0;
   for (const v1::MeshRecord& mesh : manifest.meshes()) {
     const std::string owner = "mesh '" + mesh.name() + "'";
@@ -90,8 +92,13 @@ Result<Scene> decode(const v1::SceneManifest& manifest, const BlobReader& read_b
   Scene scene;
   RADBAKE_ASSIGN_OR_RETURN(const Vec3 origin, read_origin(manifest));
   RADBAKE_ASSIGN_OR_RETURN(scene.sky, read_sky(manifest));
+  std::vector<std::shared_ptr<const LightProfile>> profiles;
+  for (const v1::LightProfile& record : manifest.light_profiles()) {
+    RADBAKE_ASSIGN_OR_RETURN(std::shared_ptr<const LightProfile> profile, read_light_profile(record, profiles.size()));
+    profiles.push_back(std::move(profile));
+  }
   for (const v1::Light& record : manifest.lights()) {
-    RADBAKE_ASSIGN_OR_RETURN(Light light, read_light(record));
+    RADBAKE_ASSIGN_OR_RETURN(Light light, read_light(record, profiles));
     scene.lights.push_back(std::move(light));
   }
   for (const v1::Material& record : manifest.materials()) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "common/base/check.h"
@@ -199,6 +200,23 @@ Result<v1::MeshRecord> encode_and_verify(const Scene& scene, const Mesh& origina
   return record;
 }
 
+/// Lights, and the profiles of luminaires: each once.
+Result<void> add_lights(const Scene& scene, v1::SceneManifest& manifest) {
+  std::map<const LightProfile*, std::uint32_t> index_of;
+  for (const Light& light : scene.lights) {
+    v1::Light& record = *manifest.add_lights();
+    record = to_proto(light);
+    const auto* luminaire = std::get_if<ProfileLight>(&light.kind);
+    if (luminaire == nullptr) continue;
+    const LightProfile* profile = luminaire->profile.get();
+    if (profile == nullptr) return invalid_argument("light '" + light.name + "' has no profile");
+    const auto [known, is_new] = index_of.emplace(profile, static_cast<std::uint32_t>(index_of.size()));
+    if (is_new) *manifest.add_light_profiles() = to_proto(*profile);
+    record.mutable_profile()->set_profile(known->second);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<EncodedScene> encode_scene(const Scene& scene, const EncodeOptions& options) {
@@ -227,7 +245,7 @@ Result<EncodedScene> encode_scene(const Scene& scene, const EncodeOptions& optio
     *record.mutable_blob() = blobs.add(std::move(blob));
   }
   for (const Material& material : scene.materials) *manifest.add_materials() = to_proto(material);
-  for (const Light& light : scene.lights) *manifest.add_lights() = to_proto(light);
+  RADBAKE_RETURN_IF_ERROR(add_lights(scene, manifest));
   if (!(scene.sky == Vec3{})) *manifest.mutable_sky() = rgb_to_proto(scene.sky);
   if (scene.environment) {
     RADBAKE_ASSIGN_OR_RETURN(std::string blob, encode_environment(*scene.environment));

@@ -167,10 +167,7 @@ v1::Light to_proto(const Light& light) {
           *profile.mutable_direction() = vector_to_proto(kind.direction);
           *profile.mutable_zero_side() = vector_to_proto(kind.zero_side);
           *profile.mutable_tint() = rgb_to_proto(kind.tint);
-          const LightProfile& table = kind.profile;
-          profile.mutable_vertical_degrees()->Add(table.vertical_degrees.begin(), table.vertical_degrees.end());
-          profile.mutable_horizontal_degrees()->Add(table.horizontal_degrees.begin(), table.horizontal_degrees.end());
-          profile.mutable_candela()->Add(table.candela.begin(), table.candela.end());
+          profile.set_is_mirrored(kind.is_mirrored);
         } else {
           *out.mutable_directional()->mutable_direction() = vector_to_proto(kind.direction);
           *out.mutable_directional()->mutable_illuminance() = rgb_to_proto(kind.illuminance);
@@ -178,6 +175,14 @@ v1::Light to_proto(const Light& light) {
         }
       },
       light.kind);
+  return out;
+}
+
+v1::LightProfile to_proto(const LightProfile& profile) {
+  v1::LightProfile out;
+  out.mutable_vertical_degrees()->Add(profile.vertical_degrees.begin(), profile.vertical_degrees.end());
+  out.mutable_horizontal_degrees()->Add(profile.horizontal_degrees.begin(), profile.horizontal_degrees.end());
+  out.mutable_candela()->Add(profile.candela.begin(), profile.candela.end());
   return out;
 }
 
@@ -226,9 +231,20 @@ Result<Material> read_material(const v1::Material& material, int num_textures) {
   return out;
 }
 
+Result<std::shared_ptr<const LightProfile>> read_light_profile(const v1::LightProfile& profile, std::size_t index) {
+  LightProfile out{{profile.vertical_degrees().begin(), profile.vertical_degrees().end()},
+                   {profile.horizontal_degrees().begin(), profile.horizontal_degrees().end()},
+                   {profile.candela().begin(), profile.candela().end()}};
+  const Result<void> checked = check_profile(out);
+  if (!checked.ok()) return invalid_argument("light profile " + std::to_string(index) + ": " + checked.error().message);
+  return std::make_shared<const LightProfile>(std::move(out));
+}
+
 namespace {
 
-Result<ProfileLight> read_profile(const v1::ProfileLight& profile, const std::string& owner) {
+using Profiles = std::span<const std::shared_ptr<const LightProfile>>;
+
+Result<ProfileLight> read_luminaire(const v1::ProfileLight& profile, Profiles profiles, const std::string& owner) {
   ProfileLight out;
   RADBAKE_ASSIGN_OR_RETURN(out.position, read_position(profile.position(), owner));
   RADBAKE_ASSIGN_OR_RETURN(out.direction, read_direction(profile.direction(), owner));
@@ -238,17 +254,18 @@ Result<ProfileLight> read_profile(const v1::ProfileLight& profile, const std::st
                             " that is not at right angles to its direction " + describe(out.direction));
   }
   RADBAKE_ASSIGN_OR_RETURN(out.tint, read_light_color(profile.tint(), owner, "tint"));
-  out.profile = {{profile.vertical_degrees().begin(), profile.vertical_degrees().end()},
-                 {profile.horizontal_degrees().begin(), profile.horizontal_degrees().end()},
-                 {profile.candela().begin(), profile.candela().end()}};
-  const Result<void> checked = check_profile(out.profile);
-  if (!checked.ok()) return invalid_argument(owner + ": " + checked.error().message);
+  if (profile.profile() >= profiles.size()) {
+    return invalid_argument(owner + " has profile " + std::to_string(profile.profile()) + " of " +
+                            std::to_string(profiles.size()));
+  }
+  out.profile = profiles[profile.profile()];
+  out.is_mirrored = profile.is_mirrored();
   return out;
 }
 
 }  // namespace
 
-Result<Light> read_light(const v1::Light& light) {
+Result<Light> read_light(const v1::Light& light, Profiles profiles) {
   const std::string owner = "light '" + light.name() + "'";
   Light out;
   out.name = light.name();
@@ -283,7 +300,7 @@ Result<Light> read_light(const v1::Light& light) {
     }
     out.kind = sun;
   } else if (light.has_profile()) {
-    RADBAKE_ASSIGN_OR_RETURN(out.kind, read_profile(light.profile(), owner));
+    RADBAKE_ASSIGN_OR_RETURN(out.kind, read_luminaire(light.profile(), profiles, owner));
   } else {
     return invalid_argument(owner + " is of no kind that this version knows");
   }

@@ -98,9 +98,17 @@ double LightProfile::lumens() const {
   return sum * 360 / horizontal_degrees.back();
 }
 
+Result<void> check_profile_size(std::size_t num_vertical, std::size_t num_horizontal) {
+  if (num_horizontal == 0 || num_vertical <= kMostProfileIntensities / num_horizontal) return {};
+  return invalid_argument("it has " + std::to_string(num_vertical) + " vertical x " + std::to_string(num_horizontal) +
+                          " horizontal angles: at most " + std::to_string(kMostProfileIntensities) +
+                          " intensities are read");
+}
+
 Result<void> check_profile(const LightProfile& profile) {
   RADBAKE_RETURN_IF_ERROR(check_angles(profile.vertical_degrees, "vertical", 180));
   RADBAKE_RETURN_IF_ERROR(check_angles(profile.horizontal_degrees, "horizontal", 360));
+  RADBAKE_RETURN_IF_ERROR(check_profile_size(profile.vertical_degrees.size(), profile.horizontal_degrees.size()));
   const double first = profile.horizontal_degrees.front(), last = profile.horizontal_degrees.back();
   const bool is_whole =
       profile.horizontal_degrees.size() == 1 ? first == 0 : first == 0 && (last == 90 || last == 180 || last == 360);

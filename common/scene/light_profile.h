@@ -29,11 +29,16 @@ struct LightProfile {
   double lumens() const;
 };
 
-/// Errors: kInvalidArgument, with the value: too few or many angles, not ascending, out of range; intensities that are
-/// not as many as pairs of angles, negative or not finite.
-Result<void> check_profile(const LightProfile& profile);
-
 /// Most angles of either kind.
 inline constexpr std::size_t kMostProfileAngles = 1024;
+/// Most intensities: at every degree, both ends of the circle among them.
+inline constexpr std::size_t kMostProfileIntensities = std::size_t{181} * 361;
+
+/// Errors: kInvalidArgument, with the numbers and the limit: more intensities than are allowed.
+Result<void> check_profile_size(std::size_t num_vertical, std::size_t num_horizontal);
+
+/// Errors: kInvalidArgument, with the value: too few or many angles, not ascending, out of range; intensities that are
+/// too many, not as many as pairs of angles, negative or not finite.
+Result<void> check_profile(const LightProfile& profile);
 
 }  // namespace radbake

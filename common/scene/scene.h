@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -126,7 +127,8 @@ struct ProfileLight {
   Vec3 direction;  ///< of vertical angle 0, unit length
   Vec3 zero_side;  ///< of horizontal angle 0, unit length, at right angles to `direction`
   Vec3 tint{1, 1, 1};
-  LightProfile profile;
+  std::shared_ptr<const LightProfile> profile;  ///< not null; luminaires of one kind share it
+  bool is_mirrored = false;                     ///< horizontal angles turn the other way
 };
 
 struct Light {

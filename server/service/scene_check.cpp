@@ -73,6 +73,7 @@ grpc::Status check_counts(const v1::SceneManifest& manifest, const Limits& limit
       {"max_meshes", static_cast<std::uint64_t>(manifest.meshes_size()), limits.max_meshes},
       {"max_textures", static_cast<std::uint64_t>(manifest.textures_size()), limits.max_textures},
       {"max_lights", static_cast<std::uint64_t>(manifest.lights_size()), limits.max_lights},
+      {"max_lights", static_cast<std::uint64_t>(manifest.light_profiles_size()), limits.max_lights},
       {"max_vertices", num_vertices, limits.max_vertices},
       {"max_triangles", num_triangles, limits.max_triangles},
       {"max_texture_pixels", num_pixels, limits.max_texture_pixels},

@@ -208,7 +208,10 @@ Result<Camera> parse_camera(const std::string& text) {
   for (;;) {
     double value = 0;
     const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || !std::isfinite(value)) break;
+    if (error != std::errc() || !std::isfinite(value)) {
+      numbers.clear();
+      break;
+    }
     numbers.push_back(value);
     if (next == end) {
       at = end;

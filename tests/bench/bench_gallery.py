@@ -4,8 +4,8 @@
                    [--cycles] [--page FILE.md]
 
 Of each room: `radbake plan`; a bake to --target, whose true error is measured against the mean of two bakes to half of it
-(seeds of their own; half of their difference is the reference's own error); the room as `radbake-study view` shows that
-bake; and each effect forced the other way, in bakes of --rays at half the density: CPU seconds (medians of --seeds) and
+(seeds of their own; half of their difference is the reference's own error); the room as `radbake-study view` shows
+the first of those two; and each effect forced the other way, in bakes of --rays at half the density: CPU seconds (medians of --seeds) and
 what it changed. What a plan leaves out must not change a bit. What it simulates must matter: the largest difference of a
 texel's means in standard errors, and the share of texels beyond five, beside what as many other seeds differ by.
 --cycles: CPU seconds of Cycles to the same error, for the rooms that it can bake (bench_cycles.py).
@@ -33,7 +33,7 @@ SKY = "sky.hdr"
 
 # Options of a bake, the camera of the view, and whether Cycles can bake the like.
 ROOMS = {
-    "goral": ("Goral's room", ["--texels-per-meter", "32"], ["1.5,1.5,8,1.5,1.5,0,50"], True),
+    "goral": ("Goral's room", ["--texels-per-meter", "32"], ["1.5,1.5,5.2,1.5,1.5,0,70"], True),
     "simple": ("The simple room", ["--texels-per-meter", "32"], ["4.3,1.8,5.1,1.9,0.95,1.3,70"], True),
     "computer": ("The computer room", ["--texels-per-meter", "24"], ["0.4,2,7.3,5,0.8,2.2,70"], True),
     "vermeer": ("The Vermeer room", ["--texels-per-meter", "32", "--sky", "4000,5000,7000",
@@ -41,7 +41,7 @@ ROOMS = {
                 ["5,1.6,6.3,1.4,1.15,1.3,70", "--background", "4000,5000,7000"], False),
     "museum": ("The museum", ["--texels-per-meter", "16", "--hdri", f"{SKY}:1000"],
                ["3.2,2,11,8,1.8,1,75", "--background", "2600,3600,6000"], False),
-    "engine": ("The engine room", ["--texels-per-meter", "16"], ["12.6,2.4,9.4,4.5,2.3,2.6,70"], False),
+    "engine": ("The engine room", ["--texels-per-meter", "16"], ["11.6,2.5,7.6,4.2,2.2,2.6,75"], False),
 }
 # Outputs, and what no bake simulates.
 NOT_LIGHT = {"vertices", "layers", "ambient_occlusion"}
@@ -65,6 +65,11 @@ def differences(one, two):
     apart = np.abs(means[0] - means[1]) / np.maximum(np.sqrt(pooled / len(one) + rounding ** 2), 1e-30)
     apart = apart.max(-1)[covered]
     return {"largest": float(apart.max()), "share": float((apart > 5).mean())}
+
+
+def passes_of(report):
+    return [{"error": p["relative_rmse"], "cpu": t["cpu_seconds"], "patches": p["num_patches"]}
+            for p, t in zip(report["passes"], report["run"]["passes"])]
 
 
 class Room:
@@ -111,9 +116,7 @@ class Room:
                 "true": max(measured ** 2 - own ** 2, 0) ** 0.5, "reference": own, "cpu": run["cpu_seconds"],
                 "wall": run["wall_seconds"], "memory": run["peak_memory_bytes"], "texels": report["error"]["texels"],
                 "sheets": report["lightmap"]["num_lightmaps"],
-                "passes": [{"error": p["relative_rmse"], "cpu": t["cpu_seconds"], "patches": p["num_patches"]}
-                           for p, t in zip(report["passes"], run["passes"])],
-                "whole": [{"stated": r["error"]["relative_rmse"], "cpu": r["run"]["cpu_seconds"]} for _, _, r in fine]}
+                "passes": passes_of(report), "fine_passes": passes_of(fine[0][2])}
 
     def by_seeds(self, seeds, *options):
         """-> [seeds, h, w, 4] light, CPU seconds; None where the plan refuses."""
@@ -148,7 +151,8 @@ class Room:
         return out
 
     def view(self, picture):
-        self.run(self.bin / "radbake-study", "view", self.folder / "baked", "-o", picture, "--size", "900x600", "--camera", *self.camera)
+        self.run(self.bin / "radbake-study", "view", self.folder / "reference_100001", "-o", picture, "--size", "900x600",
+                 "--camera", *self.camera)
 
     def by_cycles(self, target):
         """Of the laid out room, on its one sheet: what Cycles takes to the same error."""
@@ -198,6 +202,16 @@ def effects_table(measured):
     return lines
 
 
+def plot(rooms, file):
+    """Stated error over CPU seconds, pass by pass."""
+    script = ["set terminal pngcairo size 900,480", f"set output '{file}'", "set logscale xy", "set grid",
+              "set xlabel 'CPU seconds'", "set ylabel 'error, % of the mean'", "set key outside right",
+              "plot " + ", ".join(f"'-' with linespoints title \"{m['title']}\"" for _, m in rooms)]
+    for _, m in rooms:
+        script += [f"{p['cpu']} {100 * p['error']}" for p in m["target"]["fine_passes"]] + ["e"]
+    subprocess.run(["gnuplot"], input="\n".join(script) + "\n", text=True, check=True)
+
+
 def page(folder, file):
     rooms = [(name, json.loads((folder / f"{name}.json").read_text())) for name in ROOMS if (folder / f"{name}.json").exists()]
     asked = percent(rooms[0][1]["asked"])
@@ -215,22 +229,26 @@ def page(folder, file):
                      f"{t['texels']:,} | {asked} | {percent(t['stated'])} | {percent(t['true'])} (+- {percent(t['reference'])}) | "
                      f"{t['cpu']:.1f} | {t['wall']:.1f} | {t['memory'] / 2 ** 20:.0f} MiB | {cycles} |")
     lines += ["", "*stated*: what the bake says of itself. *true*: against the mean of two bakes to half of that error, with what that",
-              "mean is off by itself. The pictures show these bakes, through their lightmaps and nothing else.", ""]
+              "mean is off by itself. The pictures show bakes to half of it, through their lightmaps and nothing else.", ""]
+    lines += ["![Error over CPU seconds](error.png)", "", "What the bakes say of themselves, after each pass.", ""]
     for name, m in rooms:
         t = m["target"]
         options = " ".join(m["options"])
         lines += [f"## {m['title']}", "", f"![{m['title']}]({name}.png)", "",
                   f"    tests/scenes/make_gallery.py {name} room.glb",
-                  f"    radbake submit room.glb -o baked --max-error {asked.replace(' ', '')} {options}",
+                  f"    radbake submit room.glb -o baked --max-error {percent(m['asked'] / 2).replace(' ', '')} {options}",
                   f"    radbake-study view baked -o {name}.png --camera {' '.join(m['camera'])}", "",
                   *effects_table(m), "",
                   f"Bakes of {m['rays']} rays a texel at half the density, {m['by_effect']['seeds']} seeds, CPU seconds as planned -> "
                   "the other way. Changes: texels whose mean", "moves by more than 5 standard errors; between as many other seeds "
                   f"{percent(m['by_effect']['noise']['share'])} do, at most by {m['by_effect']['noise']['largest']:.1f}.", "",
-                  "| pass | patches | error | CPU s |", "|---|---|---|---|"]
-        lines += [f"| {k + 1} | {p['patches']:,} | {percent(p['error'])} | {p['cpu']:.2f} |" for k, p in enumerate(t["passes"])]
-        lines += [f"| to {percent(t['whole'][0]['stated'])} | | | {t['whole'][0]['cpu']:.1f} |", ""]
+                  "| asked | patches, error and CPU seconds after each pass |", "|---|---|"]
+        for target, passes in (m["asked"], t["passes"]), (m["asked"] / 2, t["fine_passes"]):
+            lines.append(f"| {percent(target)} | " +
+                         "; ".join(f"{p['patches']:,}: {percent(p['error'])} at {p['cpu']:.2f} s" for p in passes) + " |")
+        lines.append("")
     file.parent.mkdir(parents=True, exist_ok=True)
+    plot(rooms, file.parent / "error.png")
     file.write_text("\n".join(lines))
     for name, _ in rooms:
         picture = folder / f"{name}.png"

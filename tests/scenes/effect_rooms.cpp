@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 #include "tests/scenes/rooms.h"
@@ -73,7 +74,8 @@ class Room {
     light.position = {0.5, 1.8, 0.5};
     light.direction = kDown;
     light.zero_side = {1, 0, 0};
-    light.profile = {{0, 30, 60}, {0, 180}, {i, 2 * i, 0, i, i / 2, 0}};
+    light.profile =
+        std::make_shared<const LightProfile>(LightProfile{{0, 30, 60}, {0, 180}, {i, 2 * i, 0, i, i / 2, 0}});
     scene().lights.push_back({"luminaire", light});
   }
   void parallel(Vec3 direction, double lux, double diameter_degrees = 0) {

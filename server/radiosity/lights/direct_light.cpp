@@ -89,7 +89,7 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
                         1 / std::max(0.001, inner - outer)});
     } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
       lamps_.push_back({in_scene(luminaire->position), luminaire->tint, luminaire->direction, false, 0, 0,
-                        &luminaire->profile, luminaire->zero_side});
+                        luminaire->profile.get(), luminaire->zero_side, luminaire->is_mirrored});
     } else {
       suns_.push_back(std::get<DirectionalLight>(light.kind));
     }
@@ -99,7 +99,8 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
 Vec3 DirectLight::Lamp::intensity_towards(Vec3 direction) const {
   const double cosine = dot(direction, axis);
   if (profile != nullptr) {
-    return intensity * profile->intensity(cosine, dot(direction, zero_side), dot(direction, cross(zero_side, axis)));
+    const double across = dot(direction, cross(zero_side, axis));
+    return intensity * profile->intensity(cosine, dot(direction, zero_side), is_mirrored ? -across : across);
   }
   if (!is_spot) return intensity;
   // Source: KHR_lights_punctual, inner and outer cone angles.
@@ -138,7 +139,7 @@ double DirectLight::emitted_lumens() const {
     } else if (const auto* spot = std::get_if<SpotLight>(&light.kind)) {
       lumens += spot_lumens(*spot);
     } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
-      lumens += luminaire->profile.lumens() * mean_component(luminaire->tint);
+      lumens += luminaire->profile->lumens() * mean_component(luminaire->tint);
     }
   }
   return lumens;

@@ -79,6 +79,7 @@ class DirectLight {
     double outer_cosine = 0, per_ramp = 0;  ///< of a spot
     const LightProfile* profile = nullptr;  ///< of a luminaire
     Vec3 zero_side = {};
+    bool is_mirrored = false;
     /// In a direction away from it, unit length, cd.
     Vec3 intensity_towards(Vec3 direction) const;
   };

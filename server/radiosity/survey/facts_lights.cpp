@@ -101,7 +101,7 @@ void find_light_facts(const Surfaces& surfaces, const ScenePlanes& planes, Surve
       survey.lamp_lumens += spot_lumens(*spot);
       survey.is_grey &= is_grey(spot->intensity);
     } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
-      const double lumens = luminaire->profile.lumens();
+      const double lumens = luminaire->profile->lumens();
       add(luminaire->tint * lumens, place_of_lamp(surfaces, planes, luminaire->position), survey.ies);
       survey.lamp_lumens += lumens * mean_component(luminaire->tint);
       survey.is_grey &= is_grey(luminaire->tint);

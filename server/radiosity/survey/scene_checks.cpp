@@ -3,6 +3,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "server/radiosity/survey/texture.h"
+
 namespace radbake::radiosity {
 namespace {
 
@@ -190,7 +192,8 @@ Result<void> check_light(const Scene& scene, std::size_t i) {
       return invalid_argument(name + ": direction or zero side is not of unit length");
     }
     if (!is_amount(luminaire->tint)) return invalid_argument(name + ": tint " + in_words(luminaire->tint));
-    const Result<void> profile = check_profile(luminaire->profile);
+    if (luminaire->profile == nullptr) return invalid_argument(name + ": it has no profile");
+    const Result<void> profile = check_profile(*luminaire->profile);
     if (!profile.ok()) return invalid_argument(name + ": " + profile.error().message);
   } else if (const auto* sun = std::get_if<DirectionalLight>(&kind)) {
     if (!is_direction(sun->direction)) return invalid_argument(name + ": direction is not of unit length");

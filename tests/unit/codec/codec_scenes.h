@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <memory>
 #include <string>
 
 #include "common/codec/scene_codec.h"
@@ -70,6 +71,19 @@ inline Scene sheet_scene(int n = 8) {
                   {"spot", SpotLight{{4, 5, 6}, {0, 0, -1}, {1, 2, 3}, 0.25, 0.5}},
                   {"sun", DirectionalLight{{0, -1, 0}, {1000, 900, 800}}}};
   scene.sky = {5, 6, 7};
+  return scene;
+}
+
+/// The same with a curtain for a sheet, and three luminaires of two kinds for lights.
+inline Scene luminaire_scene() {
+  Scene scene = sheet_scene();
+  scene.materials[0].diffuse_transmittance = {0.5, 0.25, 0.125};
+  scene.materials[0].diffuse_transmittance_texture = TextureReference{1, 1};
+  const auto narrow = std::make_shared<const LightProfile>(LightProfile{{0, 30}, {0}, {100, 10}});
+  const auto aside = std::make_shared<const LightProfile>(LightProfile{{0, 90}, {0, 180}, {1, 2, 3, 4}});
+  scene.lights = {{"one", ProfileLight{{1, 2, 3}, {0, -1, 0}, {1, 0, 0}, {1, 0.5, 0.25}, narrow}},
+                  {"two", ProfileLight{{4, 5, 6}, {0, -1, 0}, {0, 0, 1}, {2, 2, 2}, aside, true}},
+                  {"three", ProfileLight{{7, 8, 9}, {0, -1, 0}, {1, 0, 0}, {1, 1, 1}, narrow}}};
   return scene;
 }
 

@@ -96,6 +96,37 @@ TEST(SceneCodec, KeepsSheetsFlagsSunsDiscAndInstances) {
   }
 }
 
+TEST(SceneCodec, KeepsCurtainsAndLuminairesAndSendsEachProfileOnce) {
+  const Scene scene = luminaire_scene();
+  const auto encoded = encode_scene(scene, {});
+  ASSERT_TRUE(encoded.ok()) << encoded.error().message;
+  v1::SceneManifest manifest;
+  ASSERT_TRUE(manifest.ParseFromString(encoded->blobs.back().bytes));
+  EXPECT_EQ(manifest.light_profiles_size(), 2);
+  const auto decoded = decode_encoded(*encoded);
+  ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+
+  EXPECT_EQ(decoded->materials.at(0).diffuse_transmittance, (Vec3{0.5, 0.25, 0.125}));
+  ASSERT_TRUE(decoded->materials[0].diffuse_transmittance_texture.has_value());
+  EXPECT_EQ(decoded->materials[0].diffuse_transmittance_texture->texture, 1);
+  EXPECT_EQ(decoded->materials[0].diffuse_transmittance_texture->texcoord, 1);
+
+  ASSERT_EQ(decoded->lights.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(decoded->lights[i].name, scene.lights[i].name);
+    const auto& before = std::get<ProfileLight>(scene.lights[i].kind);
+    const auto& after = std::get<ProfileLight>(decoded->lights[i].kind);
+    EXPECT_EQ(after.position, before.position);
+    EXPECT_EQ(after.direction, before.direction);
+    EXPECT_EQ(after.zero_side, before.zero_side);
+    EXPECT_EQ(after.tint, before.tint);
+    EXPECT_EQ(after.is_mirrored, before.is_mirrored);
+    EXPECT_EQ(*after.profile, *before.profile);
+  }
+  EXPECT_EQ(std::get<ProfileLight>(decoded->lights[0].kind).profile,
+            std::get<ProfileLight>(decoded->lights[2].kind).profile);
+}
+
 TEST(SceneCodec, KeepsASkyOfEveryDirection) {
   const Scene scene = environment_scene();
   const auto encoded = encode_scene(scene, {});
@@ -500,6 +531,9 @@ TEST(SceneCodec, RefusesToEncodeWhatIsNoScene) {
   scene = sheet_scene();
   for (Vec3& position : scene.meshes[0].positions) position.y = 0, position.z = 0;
   EXPECT_THAT(message_of(scene), HasSubstr("no triangle with an area"));
+  scene = luminaire_scene();
+  std::get<ProfileLight>(scene.lights[1].kind).profile.reset();
+  EXPECT_THAT(message_of(scene), HasSubstr("light 'two' has no profile"));
   scene = environment_scene();
   scene.environment->channels = 4;
   EXPECT_THAT(message_of(scene), HasSubstr("the environment 'dawn' has 4 channels: must be 3"));

@@ -310,6 +310,44 @@ TEST(UntrustedScene, ChecksEveryValueOfASky) {
             "the environment 'dawn' is 4 x 2 = 8 pixels; max_texture_pixels is 7");
 }
 
+TEST(UntrustedScene, ChecksEveryValueOfALuminaire) {
+  using M = v1::SceneManifest;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  struct Case {
+    std::function<void(M&)> change;
+    const char* message;
+  };
+  const Case cases[] = {
+      {[](M& m) { m.mutable_lights(1)->mutable_profile()->set_profile(2); }, "light 'two' has profile 2 of 2"},
+      {[](M& m) { m.clear_light_profiles(); }, "light 'one' has profile 0 of 0"},
+      {[](M& m) { m.mutable_light_profiles(1)->set_candela(2, -1); }, "light profile 1: intensity -1 cd"},
+      {[](M& m) { m.mutable_light_profiles(0)->add_candela(1); }, "light profile 0: it has 3 intensities for 2"},
+      {[](M& m) { m.mutable_light_profiles(0)->clear_vertical_degrees(); }, "light profile 0: it has 0 vertical"},
+      {[=](M& m) { m.mutable_lights(0)->mutable_profile()->mutable_position()->set_x(nan); },
+       "light 'one' has position (nan, 2, 3)"},
+      {[](M& m) { m.mutable_lights(0)->mutable_profile()->mutable_direction()->set_y(-2); },
+       "light 'one' has direction (0, -2, 0)"},
+      {[](M& m) { *m.mutable_lights(0)->mutable_profile()->mutable_zero_side() = m.lights(0).profile().direction(); },
+       "light 'one' has a zero side (0, -1, 0) that is not at right angles"},
+      {[](M& m) { m.mutable_lights(0)->mutable_profile()->mutable_tint()->set_g(-1); },
+       "light 'one' has tint (1, -1, 0.25)"},
+      {[](M& m) { m.mutable_materials(0)->mutable_diffuse_transmittance()->set_b(0.25); },
+       "material 'paint' reflects (0.25, 0.5, 0.75) and scatters (0.5, 0.25, 0.25) through"},
+      {[](M& m) { m.mutable_materials(0)->mutable_diffuse_transmittance_texture()->set_texture(2); },
+       "material 'paint' uses texture 2 of 2"},
+  };
+  for (const Case& c : cases) {
+    EXPECT_THAT(message_of(decode_changed(c.change, default_limits(), luminaire_scene())), HasSubstr(c.message));
+  }
+  v1::Limits limits = default_limits();
+  limits.set_max_lights(3);
+  const auto add_profiles = [](M& m) {
+    for (int i = 0; i < 2; ++i) *m.add_light_profiles() = m.light_profiles(0);
+  };
+  EXPECT_EQ(message_of(decode_changed(add_profiles, limits, luminaire_scene())),
+            "the scene has 4 light profiles; max_lights is 3");
+}
+
 TEST(UntrustedScene, RefusesSkiesThatAreNoLight) {
   for (const float bad : {-1.0F, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
     Scene scene = environment_scene();

@@ -27,9 +27,23 @@ TEST(Ies, IsReadByItsNumbers) {
 
 TEST(Ies, MultipliesByBallastFactorsAndSkipsTilts) {
   const auto profile =
-      read_ies("IES:LM-63-2019\nTILT=INCLUDE\n1\n3\n0 45 90\n1 0.9 0.8\n1 -1 2 2 1 1 1 0 0 0 0.5 0.5 9\n0 90 0 8 4\n");
+      read_ies("IESNA91\nTILT=INCLUDE\n1\n3\n0 45 90\n1 0.9 0.8\n1 -1 2 2 1 1 1 0 0 0 0.5 0.5 9\n0 90 0 8 4\n");
   ASSERT_TRUE(profile.ok()) << profile.error().message;
   EXPECT_EQ(profile->candela, (std::vector<float>{4, 2}));
+}
+
+// The second number: a factor up to 1995, for future use in 2002, the kind of the file in 2019.
+TEST(Ies, MultipliesByTheLampFactorOfOldFilesOnly) {
+  const auto candela = [](const std::string& head) {
+    const auto profile = read_ies(head + "TILT=NONE\n1 -1 1 1 1 1 1 0 0 0 0.5 4 9\n0 0 8\n");
+    return profile.ok() ? profile->candela.at(0) : -1;
+  };
+  EXPECT_EQ(candela(""), 16);
+  EXPECT_EQ(candela("a lamp of 1986\n"), 16);
+  EXPECT_EQ(candela("IESNA91\n"), 16);
+  EXPECT_EQ(candela("IESNA:LM-63-1995\r\n"), 16);
+  EXPECT_EQ(candela("IESNA:LM-63-2002\r\n"), 4);
+  EXPECT_EQ(candela("IES:LM-63-2019\n"), 4);
 }
 
 // Of 1995: from 90 to 270 degrees, the other half mirrors it.
@@ -38,6 +52,18 @@ TEST(Ies, UnfoldsAnglesFrom90To270) {
   ASSERT_TRUE(profile.ok()) << profile.error().message;
   EXPECT_EQ(profile->horizontal_degrees, (std::vector<double>{0, 90, 180, 270, 360}));
   EXPECT_EQ(profile->candela, (std::vector<float>{2, 1, 2, 3, 2}));
+}
+
+// 180 degrees lies between 135 and 225, and so does its mirror image 0 between 45 and 315.
+TEST(Ies, UnfoldsAnglesWithoutTheirMiddle) {
+  const auto profile = read_ies("IESNA91\nTILT=NONE\n1 1 1 1 4 1 1 0 0 0 1 1 1\n0\n90 135 225 270\n1 2 4 3\n");
+  ASSERT_TRUE(profile.ok()) << profile.error().message;
+  EXPECT_EQ(profile->horizontal_degrees, (std::vector<double>{0, 45, 90, 135, 180, 225, 270, 315, 360}));
+  EXPECT_EQ(profile->candela, (std::vector<float>{3, 2, 1, 2, 3, 4, 3, 4, 3}));
+  const auto two = read_ies("IESNA91\nTILT=NONE\n1 1 1 1 2 1 1 0 0 0 1 1 1\n0\n90 270\n1 3\n");
+  ASSERT_TRUE(two.ok()) << two.error().message;
+  EXPECT_EQ(two->horizontal_degrees, (std::vector<double>{0, 90, 180, 270, 360}));
+  EXPECT_EQ(two->candela, (std::vector<float>{2, 1, 2, 3, 2}));
 }
 
 TEST(Ies, IsRefusedWithItsFault) {
@@ -52,6 +78,14 @@ TEST(Ies, IsRefusedWithItsFault) {
   EXPECT_NE(fault(head + "1 1 1 2 1 2 1 0 0 0 1 1 1 0 90 0 1 2").find("type B"), std::string::npos);
   EXPECT_NE(fault(head + "1 1 1 2 1 3 1 0 0 0 1 1 1 0 90 0 1 2").find("type A"), std::string::npos);
   EXPECT_NE(fault(head + "1 1 1 2000000000 1 1 1 0 0 0 1 1 1").find("vertical angles is 2000000000"),
+            std::string::npos);
+  EXPECT_NE(
+      fault(head + "1 1 1 1000 1000 1 1 0 0 0 1 1 1").find("1000 vertical x 1000 horizontal angles: at most 65341"),
+      std::string::npos);
+  EXPECT_NE(fault(head + "1 1 1e30 1 1 1 1 0 0 0 1 1 1 0 0 1e30").find("intensity 1e+30 times 1e+30"),
+            std::string::npos);
+  EXPECT_NE(fault(head + "1 1 1e300 1 1 1 1 0 0 0 1e300 1 1 0 0 0").find("beyond single precision"), std::string::npos);
+  EXPECT_NE(fault(head + "1 1 1 1 4 1 1 0 0 0 1 1 1 0 90 225 135 270 1 2 3 4").find("135 comes after 225"),
             std::string::npos);
   EXPECT_NE(fault(head + "1 1 1 2 1 1 1 0 0 0 1 1 1 0 90 0 1").find("ends before intensity 2"), std::string::npos);
   EXPECT_NE(fault(head + "1 1 1 2 1 1 1 0 0 0 1 1 1 0 90 0 1 -2").find("intensity -2"), std::string::npos);
@@ -84,7 +118,63 @@ TEST(GltfLuminaires, ShineAlongMinusZOfTheirNode) {
   EXPECT_NEAR(light.direction.y, 1, kRounding);
   EXPECT_NEAR(light.zero_side.x, 1, kRounding);
   EXPECT_EQ(light.tint, (Vec3{2, 1, 0.5}));
-  EXPECT_EQ(light.profile.candela, (std::vector<float>{15, 20, 30, 40}));
+  EXPECT_EQ(light.profile->candela, (std::vector<float>{15, 20, 30, 40}));
+  EXPECT_FALSE(light.is_mirrored);
+}
+
+TEST(GltfLuminaires, ShareTheProfileOfTheirEntry) {
+  GltfBuilder file = with_luminaire(kPlain, json::object(), json::object());
+  file.add_root({{"extensions", {{"EXT_lights_ies", {{"light", 0}}}}}});
+  const auto scene = read_bytes(file.glb());
+  ASSERT_TRUE(scene.ok()) << scene.error().message;
+  ASSERT_EQ(scene->scene.lights.size(), 2u);
+  EXPECT_EQ(std::get<ProfileLight>(scene->scene.lights[0].kind).profile,
+            std::get<ProfileLight>(scene->scene.lights[1].kind).profile);
+}
+
+TEST(GltfLuminaires, AreMirroredByTheirNode) {
+  for (const auto& [scale, is_mirrored] : {std::pair<std::vector<int>, bool>{{1, -1, 1}, true},
+                                           {{-2, 1, 1}, true},
+                                           {{-1, -1, 1}, false},
+                                           {{-1, -1, -1}, true}}) {
+    const auto scene = read_bytes(with_luminaire(kPlain, {{"scale", scale}}, json::object()).glb());
+    ASSERT_TRUE(scene.ok()) << scene.error().message;
+    const auto& light = std::get<ProfileLight>(scene->scene.lights.at(0).kind);
+    EXPECT_EQ(light.is_mirrored, is_mirrored);
+    // 90 degrees is the image of +Y either way.
+    const Vec3 across = cross(light.zero_side, light.direction) * (light.is_mirrored ? -1 : 1);
+    EXPECT_EQ(across.y, scale[1]);
+  }
+}
+
+TEST(GltfLuminaires, ClampTheirColour) {
+  const auto scene =
+      read_bytes(with_luminaire(kPlain, json::object(), {{"multiplier", 2}, {"color", {3, 1.5, 0.25}}}).glb());
+  ASSERT_TRUE(scene.ok()) << scene.error().message;
+  EXPECT_EQ(std::get<ProfileLight>(scene->scene.lights.at(0).kind).tint, (Vec3{2, 2, 0.5}));
+}
+
+TEST(GltfLuminaires, AreLeftOutWithoutIntensity) {
+  const std::string dark = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 1 0 0 0 1 1 1 0 90 0 0 0";
+  for (const GltfBuilder& file : {with_luminaire(kPlain, json::object(), {{"multiplier", 0}}),
+                                  with_luminaire(kPlain, json::object(), {{"color", {0, 0, 0}}}),
+                                  with_luminaire(dark, json::object(), json::object())}) {
+    const auto scene = read_bytes(file.glb());
+    ASSERT_TRUE(scene.ok()) << scene.error().message;
+    EXPECT_TRUE(scene->scene.lights.empty());
+  }
+}
+
+TEST(GltfLuminaires, AreReadFromDataUris) {
+  GltfBuilder file = with_luminaire(kPlain, json::object(), json::object());
+  // IES:LM-63-2019, TILT=NONE, 1 -1 1 1 1 1 1 0 0 0 1 1.1 1, 0, 0, 7
+  file.document["extensions"]["EXT_lights_ies"]["lights"][0] = {
+      {"uri",
+       "data:application/x-ies-lm-63;base64,"
+       "SUVTOkxNLTYzLTIwMTkKVElMVD1OT05FCjEgLTEgMSAxIDEgMSAxIDAgMCAwIDEgMS4xIDEKMCAwIDcK"}};
+  const auto scene = read_bytes(file.glb());
+  ASSERT_TRUE(scene.ok()) << scene.error().message;
+  EXPECT_EQ(std::get<ProfileLight>(scene->scene.lights.at(0).kind).profile->candela, (std::vector<float>{7}));
 }
 
 TEST(GltfLuminaires, AreRefusedWithTheProfileAndItsFault) {
@@ -99,9 +189,28 @@ TEST(GltfLuminaires, AreRefusedWithTheProfileAndItsFault) {
   GltfBuilder outside = with_luminaire(kPlain, json::object(), json::object());
   outside.document["extensions"]["EXT_lights_ies"]["lights"][0] = {{"uri", "../secret.ies"}};
   EXPECT_NE(fault(outside).find("not a path inside the scene's folder"), std::string::npos) << fault(outside);
+  for (const char* uri : {"data:text/plain,IESNA91", "data:text/plain;base64,"}) {
+    GltfBuilder empty = with_luminaire(kPlain, json::object(), json::object());
+    empty.document["extensions"]["EXT_lights_ies"]["lights"][0] = {{"uri", uri}};
+    EXPECT_NE(fault(empty).find("light profile 0: its data URI"), std::string::npos) << fault(empty);
+  }
+  const GltfBuilder large = with_luminaire(std::string(kMaxIesBytes + 1, ' '), json::object(), json::object());
+  EXPECT_NE(fault(large).find("1048577 bytes, above the limit of 1048576"), std::string::npos) << fault(large);
   GltfBuilder missing = with_luminaire(kPlain, json::object(), json::object());
   missing.document["nodes"][1]["extensions"]["EXT_lights_ies"]["light"] = 3;
   EXPECT_NE(fault(missing).find("light"), std::string::npos);
+}
+
+// Each entry is read apart: together they are bounded.
+TEST(GltfLuminaires, AreRefusedWhereTheirFilesAreTooLargeTogether) {
+  GltfBuilder file =
+      with_luminaire(kPlain + std::string(kMaxIesBytes - kPlain.size(), ' '), json::object(), json::object());
+  auto& profiles = file.document["extensions"]["EXT_lights_ies"]["lights"];
+  for (int i = 1; i <= 64; ++i) {
+    profiles.push_back(profiles[0]);
+    file.add_root({{"extensions", {{"EXT_lights_ies", {{"light", i}}}}}});
+  }
+  expect_refused(read_bytes(file.glb()), {"light profile 64", "above the limit of 67108864"});
 }
 
 TEST(GltfMaterials, DiffuseTransmissionTakesItsShareOfWhatIsReflected) {

@@ -51,6 +51,28 @@ TEST(WriteGltf, KeepsEverythingThatItDoesNotKnow) {
   EXPECT_THAT(written.floats(times), ElementsAre(0, 1));
 }
 
+TEST(WriteGltf, BringsLightProfilesOfOtherFilesIn) {
+  const std::string profile = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 1 0 0 0 1 1 1\n0 90\n0\n5 7\n";
+  GltfBuilder file = mapped_square();
+  file.document["extensions"]["EXT_lights_ies"]["lights"] =
+      json::array({{{"uri", "my%20lamp.ies"}, {"name", "lamp"}}, {{"uri", "my%20lamp.ies"}}, {{"uri", "missing.ies"}}});
+  for (const int light : {0, 1}) file.add_root({{"extensions", {{"EXT_lights_ies", {{"light", light}}}}}});
+  const Written written = write_baked(file.glb(), in_lightmap_0, {}, "scene.glb", {{"my lamp.ies", profile}});
+  ASSERT_TRUE(written.result.ok()) << written.result.error().message;
+  const ordered_json& lights = written.document["extensions"]["EXT_lights_ies"]["lights"];
+  EXPECT_EQ(lights[0]["name"], "lamp");
+  for (const int light : {0, 1}) {
+    EXPECT_FALSE(lights[light].contains("uri"));
+    EXPECT_EQ(lights[light]["mimeType"], "application/x-ies-lm-63");
+    const ordered_json& view = written.document["bufferViews"][lights[light]["bufferView"].get<std::size_t>()];
+    EXPECT_EQ(written.bin.substr(view["byteOffset"], view["byteLength"]), profile);
+  }
+  EXPECT_EQ(lights[0]["bufferView"], lights[1]["bufferView"]);
+  EXPECT_EQ(lights[2].dump(), R"({"uri":"missing.ies"})");
+  ASSERT_EQ(written.after.scene.lights.size(), 2u);
+  EXPECT_EQ(std::get<ProfileLight>(written.after.scene.lights[1].kind).profile->candela, (std::vector<float>{5, 7}));
+}
+
 TEST(WriteGltf, AttachesALightmapToTheMaterialAndKeepsAnOwnLayout) {
   const Written written = write_baked(mapped_square().glb(), in_lightmap_0);
   ASSERT_TRUE(written.result.ok()) << written.result.error().message;

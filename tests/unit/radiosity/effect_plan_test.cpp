@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <memory>
 
 #include "server/radiosity/survey/survey.h"
 #include "tests/scenes/rooms.h"
@@ -333,7 +334,7 @@ INSTANTIATE_TEST_SUITE_P(
                      light.position = std::get<PointLight>(s.lights[0].kind).position;
                      light.direction = {0, -1, 0};
                      light.zero_side = {1, 0, 0};
-                     light.profile = {{0, 90}, {0}, {10, 10}};
+                     light.profile = std::make_shared<const LightProfile>(LightProfile{{0, 90}, {0}, {10, 10}});
                      s.lights[0].kind = light;
                    }),
               {"ies", "interreflection"},
@@ -376,8 +377,9 @@ Scene room_of_everything() {
   scene.textures.push_back(pair_of_texels(kBlack, kGrey));
   scene.materials[1].emissive_texture = scene.materials[1].reflectance_texture = TextureReference{1, 0};
   scene.lights.push_back({"spot", SpotLight{{2, 1.5, 2.5}, {0, -1, 0}, {9, 9, 9}, 0.1, 0.5}});
-  ProfileLight luminaire{
-      .position = {2, 1.5, 2.5}, .direction = {0, -1, 0}, .zero_side = {1, 0, 0}, .profile = {{0, 90}, {0}, {9, 9}}};
+  const auto profile = std::make_shared<const LightProfile>(LightProfile{{0, 90}, {0}, {9, 9}});
+  const ProfileLight luminaire{
+      .position = {2, 1.5, 2.5}, .direction = {0, -1, 0}, .zero_side = {1, 0, 0}, .profile = profile};
   scene.lights.push_back({"luminaire", luminaire});
   scene.lights.push_back({"parallel", straight_down(0)});
   scene.lights.push_back({"sun", straight_down(0.01)});

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 #include "server/radiosity/lights/direct_light.h"
@@ -63,15 +64,17 @@ TEST(Luminaire, LightsAsItsTableSays) {
   light.direction = {0, -1, 0};
   light.zero_side = {1, 0, 0};
   light.tint = {1, 2, 0.5};
-  light.profile.horizontal_degrees = {0, 90, 180, 270, 360};
-  for (int k = 0; k <= 36; ++k) light.profile.vertical_degrees.push_back(2.5 * k);
+  LightProfile profile;
+  profile.horizontal_degrees = {0, 90, 180, 270, 360};
+  for (int k = 0; k <= 36; ++k) profile.vertical_degrees.push_back(2.5 * k);
   // Towards +x as it is, towards -z (90 degrees from it, as seen from above) half of it, behind a quarter.
   for (const double share : {1.0, 0.5, 0.25, 0.5, 1.0}) {
-    for (const double v : light.profile.vertical_degrees) {
+    for (const double v : profile.vertical_degrees) {
       const double cosine = std::cos(v * std::numbers::pi / 180);
-      light.profile.candela.push_back(static_cast<float>(kIntensity * share * cosine * cosine));
+      profile.candela.push_back(static_cast<float>(kIntensity * share * cosine * cosine));
     }
   }
+  light.profile = std::make_shared<const LightProfile>(std::move(profile));
   builder.scene().lights.push_back({"luminaire", light});
   const FloorPoint floor(builder.scene());
   const auto expect = [&](Vec3 at, double share) {
@@ -90,6 +93,31 @@ TEST(Luminaire, LightsAsItsTableSays) {
     const double aslant = distance / std::sqrt(2.0);
     expect({aslant, 0, -aslant}, 0.75);
     expect({-aslant, 0, -aslant}, 0.375);
+  }
+}
+
+// 100 cd straight down; at right angles to the zero side 200 cd one way, 20 cd the other.
+TEST(Luminaire, OfAMirroredNodeIsItsMirrorImage) {
+  ProfileLight light;
+  light.position = {0, 2, 0};
+  light.direction = {0, -1, 0};
+  light.zero_side = {1, 0, 0};
+  light.profile = std::make_shared<const LightProfile>(
+      LightProfile{{0, 45}, {0, 90, 180, 270, 360}, {100, 100, 100, 200, 100, 100, 100, 20, 100, 100}});
+  const auto at = [&](bool is_mirrored, Vec3 place) {
+    tests::RoomBuilder builder = floor_scene();
+    light.is_mirrored = is_mirrored;
+    builder.scene().lights.push_back({"luminaire", light});
+    return FloorPoint(builder.scene()).irradiance(4, 1, place).x;
+  };
+  // r^2 = 8 m^2, the cosine sqrt(1/2). Just within 45 degrees: beyond there is no light.
+  constexpr double kAside = 2 - 1e-3, kTable = 0.005;
+  const double geometry = std::sqrt(0.5) / 8;
+  for (const bool is_mirrored : {false, true}) {
+    const double z = is_mirrored ? kAside : -kAside;
+    EXPECT_NEAR(at(is_mirrored, {0, 0, z}), 200 * geometry, 200 * geometry * kTable) << is_mirrored;
+    EXPECT_NEAR(at(is_mirrored, {0, 0, -z}), 20 * geometry, 200 * geometry * kTable) << is_mirrored;
+    EXPECT_NEAR(at(is_mirrored, {kAside, 0, 0}), 100 * geometry, 100 * geometry * kTable) << is_mirrored;
   }
 }
 

@@ -70,6 +70,12 @@ TEST(LightProfile, IsRefusedWithItsFault) {
   EXPECT_NE(fault(profile({90, 0}, {0}, {1, 2})).find("0 comes after 90"), std::string::npos);
   EXPECT_NE(fault(profile({0, 90}, {0, 120}, {1, 2, 3, 4})).find("from 0 to 120"), std::string::npos);
   EXPECT_NE(fault(profile({0, 90}, {0}, {1})).find("1 intensities for 2"), std::string::npos);
+  std::vector<double> vertical, horizontal;
+  for (int k = 0; k <= 180; ++k) vertical.push_back(k);
+  for (int k = 0; k <= 361; ++k) horizontal.push_back(360 * k / 361.0);
+  EXPECT_NE(fault(profile(vertical, horizontal, std::vector<float>(181 * 362)))
+                .find("181 vertical x 362 horizontal angles: at most 65341"),
+            std::string::npos);
   EXPECT_NE(fault(profile({0, 90}, {0}, {1, -2})).find("intensity -2"), std::string::npos);
   EXPECT_NE(fault(profile({0, 90}, {0}, {1, NAN})).find("intensity nan"), std::string::npos);
 }

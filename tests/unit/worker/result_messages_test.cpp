@@ -78,8 +78,8 @@ TEST(ResultMessages, SetEveryFieldOfAPlan) {
   EXPECT_THAT(unset_fields(plan), ::testing::ElementsAre("prediction"));
   EXPECT_EQ(plan.survey().num_instances(), 16U);
   EXPECT_EQ(plan.survey().escape_share(), 0.75);
-  EXPECT_EQ(plan.survey().area_volume_m2(), 29.5);
-  EXPECT_EQ(plan.survey().lamp_lumens(), 31.5);
+  EXPECT_EQ(plan.survey().area_volume_m2(), 30.5);
+  EXPECT_EQ(plan.survey().lamp_lumens(), 32.5);
   EXPECT_EQ(plan.effects(0).effect(), "sun");
   EXPECT_EQ(plan.effects(0).state(), "unsupported");
   EXPECT_EQ(plan.effects(0).value(), 26.5);

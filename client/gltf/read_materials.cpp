@@ -322,8 +322,9 @@ Result<int> MaterialReader::texcoord0_set(int index) const {
   std::vector<std::pair<int, std::string>> sets;
   if (color.index >= 0) sets.emplace_back(texcoord_set(color), "baseColorTexture");
   if (emission.index >= 0 && is_emissive(material)) sets.emplace_back(texcoord_set(emission), "emissiveTexture");
-  if (through.index >= 0 && is_translucent(material))
+  if (through.index >= 0 && is_translucent(material)) {
     sets.emplace_back(texcoord_set(through), "diffuseTransmissionColorTexture");
+  }
   std::erase_if(sets, [](const auto& use) { return use.first == 1; });
   if (sets.empty()) return 0;
   const auto other =

@@ -4,7 +4,7 @@
 
 OUT.npy: [size, size, 4] float32, rows from the top as glTF counts them; irradiance / pi of direct and indirect light,
 alpha 1 inside charts. The layout is the file's TEXCOORD_1. Materials are exact Lambertian ones with the file's base
-colours and emission, or their textures: no lamps, black surroundings. Cycles takes every surface for double-sided.
+colours and emission, or their textures: no lamps, black surroundings. What glows does so on its front; Cycles takes surfaces that reflect for double-sided.
 The last line on stdout is JSON: CPU and wall seconds of the bake alone, without start, import and files.
 """
 import argparse
@@ -90,7 +90,15 @@ def make_lambertian(material, reflectance, radiance, png, image):
         coordinates.uv_map = "UVMap"  # as the importer names TEXCOORD_0
         links.new(coordinates.outputs["UV"], textured.inputs["Vector"])
         links.new(textured.outputs["Color"], surface.inputs["Color"])
-    links.new(surface.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    seen = surface
+    if max(radiance) > 0:
+        # Dark on the back.
+        seen, dark = nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeBsdfDiffuse")
+        dark.inputs["Color"].default_value = (0, 0, 0, 1)
+        links.new(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], seen.inputs[0])
+        links.new(surface.outputs[0], seen.inputs[1])
+        links.new(dark.outputs[0], seen.inputs[2])
+    links.new(seen.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     target = nodes.new("ShaderNodeTexImage")
     target.image = image
     nodes.active = target

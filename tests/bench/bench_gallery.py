@@ -5,13 +5,13 @@
 
 Of each room: `radbake plan`; a bake to --target, whose true error is measured against the mean of two bakes to half of it
 (seeds of their own; half of their difference is the reference's own error); the room as `radbake-study view` shows
-the first of those two; and each effect forced the other way, in bakes of --rays at half the density: CPU seconds (medians of --seeds) and
+the first of those two; and each effect forced the other way, in bakes of --rays at half the density: CPU seconds (medians of three pairs) and
 what it changed. What a plan leaves out must not change a bit. What it simulates must matter: the largest difference of a
 texel's means in standard errors, and the share of texels beyond five, beside what as many other seeds differ by.
 --cycles: CPU seconds of Cycles to the same error, for the rooms that it can bake (bench_cycles.py).
 
 DIR/ROOM.json holds what was measured: rooms that are there are not measured again. --page writes the page of all rooms in
-DIR, and a picture of each beside it. Needs python3-numpy, python3-openimageio; for --cycles Debian's blender.
+DIR, with a plot and pictures beside it. Needs python3-numpy, python3-openimageio; for --cycles Debian's blender.
 """
 import argparse
 import json
@@ -33,18 +33,19 @@ SKY = "sky.hdr"
 
 # Options of a bake, the camera of the view, and whether Cycles can bake the like.
 ROOMS = {
-    "goral": ("Goral's room", ["--texels-per-meter", "32"], ["1.5,1.5,5.2,1.5,1.5,0,70"], True),
-    "simple": ("The simple room", ["--texels-per-meter", "32"], ["4.3,1.8,5.1,1.9,0.95,1.3,70"], True),
-    "computer": ("The computer room", ["--texels-per-meter", "24"], ["0.4,2,7.3,5,0.8,2.2,70"], True),
+    "goral": ("Goral's room", ["--texels-per-meter", "32", "--atlas-size", "512"], ["1.5,1.5,5.1,1.5,1.5,0,70"], True),
+    "simple": ("The simple room", ["--texels-per-meter", "32", "--atlas-size", "512"], ["3.85,1.75,4.4,1.9,0.95,1.3,78"], True),
+    "computer": ("The computer room", ["--texels-per-meter", "24", "--atlas-size", "1024"], ["0.4,2,7.3,5,0.8,2.2,70"], True),
     "vermeer": ("The Vermeer room", ["--texels-per-meter", "32", "--sky", "4000,5000,7000",
                                      "--sun=1,-0.62,-0.42:60000,55000,46000"],
-                ["5,1.6,6.3,1.4,1.15,1.3,70", "--background", "4000,5000,7000"], False),
+                ["4.75,1.6,5.85,1.4,1.15,1.3,75", "--background", "4000,5000,7000"], False),
     "museum": ("The museum", ["--texels-per-meter", "16", "--hdri", f"{SKY}:1000"],
                ["3.2,2,11,8,1.8,1,75", "--background", "2600,3600,6000"], False),
     "engine": ("The engine room", ["--texels-per-meter", "16"], ["11.6,2.5,7.6,4.2,2.2,2.6,75"], False),
 }
 # Outputs, and what no bake simulates.
 NOT_LIGHT = {"vertices", "layers", "ambient_occlusion"}
+TIMED_PAIRS = 3
 
 
 def box_sum(values):
@@ -75,7 +76,7 @@ def passes_of(report):
 class Room:
     def __init__(self, name, arguments):
         self.name, self.bin, self.rays = name, arguments.bin.resolve(), str(arguments.rays)
-        self.title, self.options, self.camera, self.is_for_cycles = ROOMS[name]
+        self.title, self.options, _, self.is_for_cycles = ROOMS[name]
         self.coarse = ["--texels-per-meter", str(int(self.options[1]) // 2)]
         self.folder = arguments.out / name
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -119,40 +120,41 @@ class Room:
                 "passes": passes_of(report), "fine_passes": passes_of(fine[0][2])}
 
     def by_seeds(self, seeds, *options):
-        """-> [seeds, h, w, 4] light, CPU seconds; None where the plan refuses."""
+        """-> [seeds, h, w, 4] light, CPU seconds. Errors: CalledProcessError where the plan refuses."""
         maps, seconds = [], []
         for seed in seeds:
-            try:
-                light, _, report = self.bake("effect", "--rays", self.rays, *self.coarse, "--seed", str(seed), *options)
-            except subprocess.CalledProcessError:
-                return None, None
+            light, _, report = self.bake("effect", "--rays", self.rays, *self.coarse, "--seed", str(seed), *options)
             maps.append(light)
             seconds.append(report["run"]["cpu_seconds"])
         return np.array(maps), seconds
 
     def by_effect(self, plan, num_seeds):
         seeds, others = range(1, num_seeds + 1), range(num_seeds + 1, 2 * num_seeds + 1)
-        planned, cpu = self.by_seeds(seeds)
-        noise = differences(planned, self.by_seeds(others)[0])
-        out = {"noise": noise, "seeds": num_seeds, "effects": []}
+        planned, _ = self.by_seeds(seeds)
+        out = {"noise": differences(planned, self.by_seeds(others)[0]), "seeds": num_seeds, "effects": []}
         for effect in plan["effects"]:
             name, state = effect["effect"], effect["state"]
             if state not in ("on", "off") or name in NOT_LIGHT:
                 continue
-            few = seeds if state == "on" else seeds[:3]
-            forced, forced_cpu = self.by_seeds(few, "--effect", f"{name}={'off' if state == 'on' else 'on'}")
-            if forced is None:
+            force = ["--effect", f"{name}={'off' if state == 'on' else 'on'}"]
+            maps, cpu, forced_cpu = [], [], []
+            try:
+                for seed in seeds:
+                    light, forced_seconds = self.by_seeds([seed], *force)
+                    maps.append(light[0])
+                    if seed > TIMED_PAIRS:
+                        continue
+                    # By turns: the machine is not always as quick.
+                    cpu += self.by_seeds([seed])[1]
+                    forced_cpu += forced_seconds
+            except subprocess.CalledProcessError:
                 out["effects"].append({"effect": name, "state": state, "refused": True})
                 continue
-            like = planned[:len(few)]
-            out["effects"].append({"effect": name, "state": state, "bits": int((like != forced).sum()),
-                                   **(differences(like, forced) if state == "on" else {}),
-                                   "planned": statistics.median(cpu[:len(few)]), "forced": statistics.median(forced_cpu)})
+            forced = np.array(maps)
+            out["effects"].append({"effect": name, "state": state, "bits": int((planned != forced).sum()),
+                                   **(differences(planned, forced) if state == "on" else {}),
+                                   "planned": statistics.median(cpu), "forced": statistics.median(forced_cpu)})
         return out
-
-    def view(self, picture):
-        self.run(self.bin / "radbake-study", "view", self.folder / "reference_100001", "-o", picture, "--size", "900x600",
-                 "--camera", *self.camera)
 
     def by_cycles(self, target):
         """Of the laid out room, on its one sheet: what Cycles takes to the same error."""
@@ -169,14 +171,13 @@ def measure(name, arguments):
     room = Room(name, arguments)
     plan = room.plan()
     target = room.to_target(arguments.target)
-    measured = {"title": room.title, "triangles": room.num_triangles, "options": ROOMS[name][1], "camera": room.camera,
+    measured = {"title": room.title, "triangles": room.num_triangles, "options": ROOMS[name][1],
                 "asked": arguments.target / 100,
                 "plan": [{k: e[k] for k in ("effect", "state", "reason")} for e in plan["effects"]],
                 "patches": plan["num_patches"], "target": target, "rays": arguments.rays,
                 "by_effect": room.by_effect(plan, arguments.seeds)}
     if arguments.cycles and room.is_for_cycles:
         measured["cycles"] = room.by_cycles(arguments.target)
-    room.view(arguments.out / f"{name}.png")
     return measured
 
 
@@ -212,7 +213,7 @@ def plot(rooms, file):
     subprocess.run(["gnuplot"], input="\n".join(script) + "\n", text=True, check=True)
 
 
-def page(folder, file):
+def page(folder, file, binaries):
     rooms = [(name, json.loads((folder / f"{name}.json").read_text())) for name in ROOMS if (folder / f"{name}.json").exists()]
     asked = percent(rooms[0][1]["asked"])
     lines = ["# The gallery", "",
@@ -237,7 +238,7 @@ def page(folder, file):
         lines += [f"## {m['title']}", "", f"![{m['title']}]({name}.png)", "",
                   f"    tests/scenes/make_gallery.py {name} room.glb",
                   f"    radbake submit room.glb -o baked --max-error {percent(m['asked'] / 2).replace(' ', '')} {options}",
-                  f"    radbake-study view baked -o {name}.png --camera {' '.join(m['camera'])}", "",
+                  f"    radbake-study view baked -o {name}.png --camera {' '.join(ROOMS[name][2])}", "",
                   *effects_table(m), "",
                   f"Bakes of {m['rays']} rays a texel at half the density, {m['by_effect']['seeds']} seeds, CPU seconds as planned -> "
                   "the other way. Changes: texels whose mean", "moves by more than 5 standard errors; between as many other seeds "
@@ -251,9 +252,8 @@ def page(folder, file):
     plot(rooms, file.parent / "error.png")
     file.write_text("\n".join(lines))
     for name, _ in rooms:
-        picture = folder / f"{name}.png"
-        if picture.exists():
-            (file.parent / picture.name).write_bytes(picture.read_bytes())
+        subprocess.run([binaries / "radbake-study", "view", folder / name / "reference_100001", "-o",
+                        file.parent / f"{name}.png", "--size", "900x600", "--camera", *ROOMS[name][2]], check=True)
 
 
 def main():
@@ -275,7 +275,7 @@ def main():
         kept.write_text(json.dumps(measure(name, arguments), indent=1) + "\n")
         print(f"{name}: measured", flush=True)
     if arguments.page:
-        page(arguments.out, arguments.page)
+        page(arguments.out, arguments.page, arguments.bin)
 
 
 if __name__ == "__main__":

@@ -252,23 +252,23 @@ def simple():
 
 
 def screen_image():
-    """Lines of text, green on black."""
+    """Lines of text, green on black, in the upper half."""
     rng = random.Random(9)
-    rows = [[rng.random() < 0.7 and rng.randrange(6, 40) or 0] for _ in range(16)]
+    rows = [[(k < 9 and rng.random() < 0.8 and rng.randrange(12, 44)) or 0] for k in range(16)]
 
     def pixel(x, y):
         line, within = divmod(y, 6)
         is_on = within < 4 and line < 16 and x // 2 < rows[line][0] and (x * 7 + line * 13) % 5 != 0
-        return (90, 255, 140) if is_on else (4, 22, 9)
+        return (90, 255, 140) if is_on else (0, 5, 2)
     return png(96, 96, pixel)
 
 
 def computer():
     glow = matte(0, 0, 0, emissiveFactor=[1, 1, 1], emissiveTexture={"index": 0},
-                 extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 220}})
+                 extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 1600}})
     room = Room({"wall": matte(0.7, 0.7, 0.66), "carpet": matte(0.18, 0.22, 0.3), "tiles": matte(0.78, 0.78, 0.76),
                  "desk": matte(0.62, 0.5, 0.36), "case": matte(0.6, 0.58, 0.52), "screen": glow,
-                 "seat": matte(0.12, 0.13, 0.16), "lamp": glowing(2600, 2700, 2800)}, [screen_image()])
+                 "seat": matte(0.12, 0.13, 0.16), "lamp": glowing(420, 450, 500)}, [screen_image()])
     shell(room, (9, 2.8, 7), "carpet", "tiles", "wall", "wall", "wall", "wall")
     table(room, "desk", (-0.7, 0, -0.4), (0.7, 0.74, 0.4), "desk", "case")
     room.block("monitor", (-0.2, 0.76, -0.3), (0.2, 1.12, 0.05), "case")

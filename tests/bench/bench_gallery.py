@@ -5,7 +5,7 @@
 
 Of each room: `radbake plan`; a bake to --target, whose true error is measured against the mean of two bakes to half of it
 (seeds of their own; half of their difference is the reference's own error); the room as `radbake-study view` shows
-the first of those two; and each effect forced the other way, in bakes of --rays at half the density: CPU seconds (medians of three pairs) and
+the first of those two; and each effect forced the other way, in bakes of --rays at half the density (the museum: more rays): CPU seconds (medians of three pairs) and
 what it changed. What a plan leaves out must not change a bit. What it simulates must matter: the largest difference of a
 texel's means in standard errors, and the share of texels beyond five, beside what as many other seeds differ by.
 --cycles: CPU seconds of Cycles to the same error, for the rooms that it can bake (bench_cycles.py).
@@ -46,6 +46,8 @@ ROOMS = {
 # Outputs, and what no bake simulates.
 NOT_LIGHT = {"vertices", "layers", "ambient_occlusion"}
 TIMED_PAIRS = 3
+# Texels a metre and rays of the bakes by effect, where half the density and --rays tell too little.
+BY_EFFECT = {"museum": (4, 256)}
 
 
 def box_sum(values):
@@ -75,9 +77,10 @@ def passes_of(report):
 
 class Room:
     def __init__(self, name, arguments):
-        self.name, self.bin, self.rays = name, arguments.bin.resolve(), str(arguments.rays)
+        self.name, self.bin = name, arguments.bin.resolve()
         self.title, self.options, _, self.is_for_cycles = ROOMS[name]
-        self.coarse = ["--texels-per-meter", str(int(self.options[1]) // 2)]
+        self.density, self.rays = BY_EFFECT.get(name, (int(self.options[1]) // 2, arguments.rays))
+        self.coarse = ["--texels-per-meter", str(self.density), "--rays", str(self.rays)]
         self.folder = arguments.out / name
         self.folder.mkdir(parents=True, exist_ok=True)
         self.scene = self.folder / "room.glb"
@@ -123,7 +126,7 @@ class Room:
         """-> [seeds, h, w, 4] light, CPU seconds. Errors: CalledProcessError where the plan refuses."""
         maps, seconds = [], []
         for seed in seeds:
-            light, _, report = self.bake("effect", "--rays", self.rays, *self.coarse, "--seed", str(seed), *options)
+            light, _, report = self.bake("effect", *self.coarse, "--seed", str(seed), *options)
             maps.append(light)
             seconds.append(report["run"]["cpu_seconds"])
         return np.array(maps), seconds
@@ -174,7 +177,7 @@ def measure(name, arguments):
     measured = {"title": room.title, "triangles": room.num_triangles, "options": ROOMS[name][1],
                 "asked": arguments.target / 100,
                 "plan": [{k: e[k] for k in ("effect", "state", "reason")} for e in plan["effects"]],
-                "patches": plan["num_patches"], "target": target, "rays": arguments.rays,
+                "patches": plan["num_patches"], "target": target, "rays": room.rays, "density": room.density,
                 "by_effect": room.by_effect(plan, arguments.seeds)}
     if arguments.cycles and room.is_for_cycles:
         measured["cycles"] = room.by_cycles(arguments.target)
@@ -240,7 +243,7 @@ def page(folder, file, binaries):
                   f"    radbake submit room.glb -o baked --max-error {percent(m['asked'] / 2).replace(' ', '')} {options}",
                   f"    radbake-study view baked -o {name}.png --camera {' '.join(ROOMS[name][2])}", "",
                   *effects_table(m), "",
-                  f"Bakes of {m['rays']} rays a texel at half the density, {m['by_effect']['seeds']} seeds, CPU seconds as planned -> "
+                  f"Bakes of {m['rays']} rays a texel, {m['density']} texels a metre, {m['by_effect']['seeds']} seeds, CPU seconds as planned -> "
                   "the other way. Changes: texels whose mean", "moves by more than 5 standard errors; between as many other seeds "
                   f"{percent(m['by_effect']['noise']['share'])} do, at most by {m['by_effect']['noise']['largest']:.1f}.", "",
                   "| asked | patches, error and CPU seconds after each pass |", "|---|---|"]

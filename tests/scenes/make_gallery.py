@@ -337,7 +337,7 @@ def museum():
     room = Room({"plaster": matte(0.78, 0.76, 0.72), "parquet": textured(6), "stone": matte(0.66, 0.62, 0.54),
                  "frame": matte(0.45, 0.32, 0.12), "bench": matte(0.3, 0.18, 0.1), "bronze": matte(0.28, 0.2, 0.12),
                  "clay": matte(0.6, 0.32, 0.2), **{f"picture {k}": textured(k) for k in range(6)}},
-                paints + [checkers((120, 78, 44), (150, 102, 60))])
+                paints + [checkers((38, 32, 28), (224, 210, 186))])
     w, h, d = 16.0, 5.5, 9.0
     room.quad("floor", (0, 0, d), (w, 0, 0), (0, 0, -d), "parquet")
     shell(room, (w, h, d), None, None, "plaster", "plaster", "plaster", "plaster")

@@ -5,7 +5,7 @@
 
 Of each room: `radbake plan`; a bake to --target, whose true error is measured against the mean of two bakes to half of it
 (seeds of their own; half of their difference is the reference's own error); the room as `radbake-study view` shows
-the first of those two; and each effect forced the other way, in bakes of --rays at half the density (the museum: more rays): CPU seconds (medians of three pairs) and
+the first of those two; and each effect forced the other way, in bakes of --rays at half the density (the museum: more rays): CPU seconds (medians of pairs) and
 what it changed. What a plan leaves out must not change a bit. What it simulates must matter: the largest difference of a
 texel's means in standard errors, and the share of texels beyond five, beside what as many other seeds differ by.
 --cycles: CPU seconds of Cycles to the same error, for the rooms that it can bake (bench_cycles.py).
@@ -45,7 +45,7 @@ ROOMS = {
 }
 # Outputs, and what no bake simulates.
 NOT_LIGHT = {"vertices", "layers", "ambient_occlusion"}
-TIMED_PAIRS = 3
+TIMED_PAIRS = 2
 # Texels a metre and rays of the bakes by effect, where half the density and --rays tell too little.
 BY_EFFECT = {"museum": (4, 256)}
 
@@ -225,7 +225,7 @@ def page(folder, file, binaries):
              f"| room | triangles | texels | asked | stated | true | CPU s | wall s | memory | Cycles at {asked} |",
              "|---|---|---|---|---|---|---|---|---|---|"]
     for name, m in rooms:
-        t, cycles = m["target"], "it has no such effects"
+        t, cycles = m["target"], "cannot bake the like"
         if "cycles" in m:
             ours = m["cycles"]["radbake"][0]
             cycles = f"{ours['to_target']['cycles_cpu']:.0f} CPU s, {ours['to_target']['ratio']:.0f} x of {ours['cpu']:.2f}"

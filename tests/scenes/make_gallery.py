@@ -397,7 +397,7 @@ def engine():
     room = Room({"concrete": matte(0.5, 0.5, 0.48), "wall": matte(0.55, 0.57, 0.52), "steel": matte(0.4, 0.42, 0.45),
                  "red pipe": matte(0.6, 0.12, 0.08), "green pipe": matte(0.15, 0.42, 0.22), "copper": matte(0.6, 0.34, 0.2),
                  "grating": {**textured(0), "alphaMode": "MASK", "alphaCutoff": 0.5, "doubleSided": True},
-                 "boiler": matte(0.3, 0.36, 0.42)}, [grating()])
+                 "boiler": matte(0.3, 0.36, 0.42), "sheet metal": matte(0.75, 0.72, 0.62, doubleSided=True)}, [grating()])
     w, h, d = 12.0, 6.0, 8.0
     shell(room, (w, h, d), "concrete", "concrete", "wall", "wall", "wall", "wall")
     # Boilers, their caps and bolts.
@@ -446,6 +446,9 @@ def engine():
         room.turned("rail", (k * 1.0, 2.6, 5.55), lambda t: (0.02, 1.05 * t), 16, 4, "steel")
     for y in (3.1, 3.65):
         room.tube("rail", lambda s, y=y: (10.0 * s, y, 5.55), 0.022, 80, 16, "steel", 10.0)
+    # Sheets that stand before the right wall, their backs to the room.
+    for k in range(2):
+        room.quad("screens", (10.6, 0.05, 5.6 - 2.2 * k), (0, 0, -1.8), (0, 2.2, 0), "sheet metal")
     for k in range(4):
         room.luminaire(f"downlight {k + 1}", DOWNLIGHT, (1.8 + 2.8 * k, 5.2, 6.6), multiplier=2)
     room.light("work lamp", "point", (6.0, 1.8, 4.0), (1, 0.85, 0.6), 160)

@@ -187,8 +187,7 @@ class SceneReader {
   // A texture needs the coordinates that it names.
   Result<void> check_texcoords(const Mesh& mesh, const std::string& label, int texcoord0_set) {
     const Material& material = materials_.materials()[mesh.material];
-    for (const auto& texture :
-         {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
+    for (const auto& texture : material.textures()) {
       if (!texture || !(texture->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty()) continue;
       return invalid_argument(label + ": its material " + in_quotes(material.name) + " has a texture on TEXCOORD_" +
                               std::to_string(texture->texcoord == 0 ? texcoord0_set : 1) +

@@ -155,6 +155,16 @@ Result<std::vector<Light>> read_lights(const tinygltf::Model& model, const std::
                                        std::span<const PlacedNode> nodes) {
   std::vector<Light> lights;
   Profiles profiles(model, folder);
+  // A light is called as its node, else as it was given in the file.
+  const auto add = [&](Result<Light> light, int node_index, const std::string& given_name) -> Result<void> {
+    if (!light.ok()) return invalid_argument(node_name(model, node_index) + ": " + light.error().message);
+    const std::string& called = model.nodes[node_index].name;
+    light->name = printable(!called.empty()       ? called
+                            : !given_name.empty() ? given_name
+                                                  : "light" + std::to_string(lights.size()));
+    lights.push_back(std::move(light).value());
+    return {};
+  };
   for (const PlacedNode& placed : nodes) {
     const tinygltf::Node& node = model.nodes[placed.node];
     if (const auto luminaire = node.extensions.find("EXT_lights_ies"); luminaire != node.extensions.end()) {
@@ -165,25 +175,15 @@ Result<std::vector<Light>> read_lights(const tinygltf::Model& model, const std::
         RADBAKE_ASSIGN_OR_RETURN(profile, profiles.get(index));
       }
       if (profile != nullptr && !is_dark(*profile)) {
-        Result<Light> light = read_luminaire(tint, profile, placed.to_world);
-        if (!light.ok()) return invalid_argument(node_name(model, placed.node) + ": " + light.error().message);
-        const std::string given = profiles.given_name(index);
-        light->name = printable(!node.name.empty() ? node.name
-                                : !given.empty()   ? given
-                                                   : "light" + std::to_string(lights.size()));
-        lights.push_back(std::move(light).value());
+        RADBAKE_RETURN_IF_ERROR(
+            add(read_luminaire(tint, profile, placed.to_world), placed.node, profiles.given_name(index)));
       }
     }
     const auto extension = node.extensions.find("KHR_lights_punctual");
     if (extension == node.extensions.end()) continue;
     const tinygltf::Light& source = model.lights[extension->second.Get("light").GetNumberAsInt()];
     if (is_dark(source)) continue;
-    Result<Light> light = read_light(source, placed.to_world);
-    if (!light.ok()) return invalid_argument(node_name(model, placed.node) + ": " + light.error().message);
-    light->name = printable(!node.name.empty()     ? node.name
-                            : !source.name.empty() ? source.name
-                                                   : "light" + std::to_string(lights.size()));
-    lights.push_back(std::move(light).value());
+    RADBAKE_RETURN_IF_ERROR(add(read_light(source, placed.to_world), placed.node, source.name));
   }
   return lights;
 }

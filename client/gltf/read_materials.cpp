@@ -84,13 +84,17 @@ const tinygltf::Value* diffuse_transmission(const tinygltf::Material& material) 
   return is_unlit(material) ? nullptr : extension(material.extensions, "KHR_materials_diffuse_transmission");
 }
 
+Vec3 diffuse_transmission_color(const tinygltf::Value& diffuse) {
+  Vec3 color{1, 1, 1};
+  if (!diffuse.Has("diffuseTransmissionColorFactor")) return color;
+  const tinygltf::Value& factors = diffuse.Get("diffuseTransmissionColorFactor");
+  for (int c = 0; c < 3; ++c) color[c] = factors.Get(c).GetNumberAsDouble();
+  return color;
+}
+
 bool is_translucent(const tinygltf::Material& material) {
   const tinygltf::Value* diffuse = diffuse_transmission(material);
-  if (number(diffuse, "diffuseTransmissionFactor", 0) <= 0) return false;
-  if (!diffuse->Has("diffuseTransmissionColorFactor")) return true;
-  const tinygltf::Value& color = diffuse->Get("diffuseTransmissionColorFactor");
-  return color.Get(0).GetNumberAsDouble() > 0 || color.Get(1).GetNumberAsDouble() > 0 ||
-         color.Get(2).GetNumberAsDouble() > 0;
+  return number(diffuse, "diffuseTransmissionFactor", 0) > 0 && max_component(diffuse_transmission_color(*diffuse)) > 0;
 }
 
 // A texture that an extension uses: tinygltf leaves it as it stands in the file. Index -1: there is none.
@@ -272,11 +276,7 @@ Result<void> MaterialReader::read_diffuse_transmission(const tinygltf::Material&
   }
   // What goes straight through comes first, and metal lets nothing through.
   RADBAKE_ASSIGN_OR_RETURN(const MetalUse metal, read_metal(source));
-  Vec3 color{1, 1, 1};
-  if (diffuse->Has("diffuseTransmissionColorFactor")) {
-    const tinygltf::Value& factors = diffuse->Get("diffuseTransmissionColorFactor");
-    for (int c = 0; c < 3; ++c) color[c] = factors.Get(c).GetNumberAsDouble();
-  }
+  Vec3 color = diffuse_transmission_color(*diffuse);
   for (int c = 0; c < 3; ++c) color[c] = std::fmin(color[c], options_.max_reflectance);
   material.diffuse_transmittance = color * (share * metal.mean.dielectric * (1 - transmission_of(source)));
   material.reflectance *= 1 - share * metal.mean.dielectric;

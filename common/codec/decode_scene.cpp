@@ -69,8 +69,7 @@ Result<std::string> read_declared(const v1::Digest& digest, const std::string& o
 
 /// A texture coordinate that a material uses must be there.
 Result<void> check_texcoords(const Mesh& mesh, const Material& material) {
-  for (const auto& reference :
-       {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
+  for (const auto& reference : material.textures()) {
     if (!reference || !(reference->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty()) continue;
     return invalid_argument("mesh '" + mesh.name + "' has no texcoord " + std::to_string(reference->texcoord) +
                             ", which a texture of its material '" + material.name + "' uses");

@@ -84,8 +84,7 @@ double largest_stretch(const UvTransform& transform) {
 /// Texels by which a look-up moves when the mesh's coordinate moves by 1, the largest; 0: nothing looks it up.
 double texels_looked_up(const Scene& scene, const Material& material, int texcoord) {
   double size = 0;
-  for (const auto& reference :
-       {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
+  for (const auto& reference : material.textures()) {
     if (!reference || reference->texcoord != texcoord) continue;
     if (reference->texture < 0 || static_cast<std::size_t>(reference->texture) >= scene.textures.size()) continue;
     const TexturePlane& plane = scene.textures[reference->texture];

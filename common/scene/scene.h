@@ -79,6 +79,11 @@ struct Material {
   bool is_refractive = false;  ///< has an inside that bends light
   bool has_normal_map = false;
   bool has_volume = false;  ///< absorbs or scatters inside
+
+  /// The textures that look something up by the mesh's coordinates; absent ones too.
+  std::array<std::optional<TextureReference>, 3> textures() const {
+    return {reflectance_texture, emissive_texture, diffuse_transmittance_texture};
+  }
 };
 
 /// Bounds of Mesh::texel_density.

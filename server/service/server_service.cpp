@@ -19,8 +19,9 @@ grpc::ServerUnaryReactor* ServerService::GetCapabilities(grpc::CallbackServerCon
   capabilities->add_estimators("hemisphere");
   capabilities->add_transports("sparse");
   capabilities->add_solvers("gauss-seidel");
-  for (const char* light : {"emitters", "sky", "sun", "point", "spot", "ies", "directional"})
+  for (const char* light : {"emitters", "sky", "sun", "point", "spot", "ies", "directional"}) {
     capabilities->add_lights(light);
+  }
   capabilities->set_cores(std::thread::hardware_concurrency());
   reactor->Finish(check_protocol(*context));
   return reactor;

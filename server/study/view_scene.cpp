@@ -96,12 +96,23 @@ class Lens {
         tangent_(std::tan(camera.fov_degrees * std::numbers::pi / 360) * 2 / std::max(options.width, options.height)) {}
 
   bool is_finite() const { return radbake::is_finite(forward_) && radbake::is_finite(right_); }
+  /// The rays of one line, y pixels below the top: `samples` in each of its pixels.
+  void aim(double y, int samples, Vec3 eye, std::vector<Ray>& rays) const {
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+      const Vec3 d = direction((static_cast<double>(k) + 0.5) / samples, y);
+      for (int c = 0; c < 3; ++c) {
+        rays[k].origin[static_cast<std::size_t>(c)] = static_cast<float>(eye[c]);
+        rays[k].direction[static_cast<std::size_t>(c)] = static_cast<float>(d[c]);
+      }
+    }
+  }
+
+ private:
   /// x, y: in pixels from the top left corner.
   Vec3 direction(double x, double y) const {
     return normalized(forward_ + right_ * ((x - width_ / 2.0) * tangent_) - up_ * ((y - height_ / 2.0) * tangent_));
   }
 
- private:
   Vec3 forward_, right_, up_;
   int width_, height_;
   double tangent_;
@@ -250,33 +261,26 @@ Result<image::Pixels> render_view(const BakedScene& baked, const Camera& camera,
   picture.values.resize(static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height) * 3);
   const int num_channels = surfaces.has_coloured_tint() ? 3 : 1;
   const auto row_size = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.samples);
+  const auto row_of = [&](std::size_t y) { return &picture.values[3 * y * static_cast<std::size_t>(options.width)]; };
   radiosity::for_each_range(static_cast<std::size_t>(options.height), 1, [&](std::size_t begin, std::size_t end) {
     std::vector<Ray> rays(row_size);
     std::vector<Hit> hits(row_size);
     const double share = 1.0 / (options.samples * options.samples);
     for (std::size_t y = begin; y < end; ++y) {
       for (int line = 0; line < options.samples; ++line) {
-        for (std::size_t k = 0; k < row_size; ++k) {
-          const Vec3 d = lens.direction((static_cast<double>(k) + 0.5) / options.samples,
-                                        static_cast<double>(y) + (line + 0.5) / options.samples);
-          for (int c = 0; c < 3; ++c) {
-            rays[k].origin[static_cast<std::size_t>(c)] = static_cast<float>(eye[c]);
-            rays[k].direction[static_cast<std::size_t>(c)] = static_cast<float>(d[c]);
-          }
-        }
+        lens.aim(static_cast<double>(y) + (line + 0.5) / options.samples, options.samples, eye, rays);
         for (int channel = 0; channel < num_channels; ++channel) {
           std::vector<Ray> onward = rays;
           see(visibility->channel(channel), surfaces, onward, hits);
           for (std::size_t k = 0; k < row_size; ++k) {
             const Vec3 l =
                 hits[k].triangle == radiosity::kNoHit ? options.background : luminance_at(baked, surfaces, hits[k]);
-            const std::size_t pixel =
-                3 * (y * static_cast<std::size_t>(options.width) + k / static_cast<std::size_t>(options.samples));
-            for (int c = 0; c < 3; ++c) {
-              if (num_channels == 1 || c == channel) {
-                picture.values[pixel + static_cast<std::size_t>(c)] += static_cast<float>(share * l[c]);
-              }
+            float* pixel = &row_of(y)[3 * (k / static_cast<std::size_t>(options.samples))];
+            if (num_channels == 3) {
+              pixel[channel] += static_cast<float>(share * l[channel]);
+              continue;
             }
+            for (int c = 0; c < 3; ++c) pixel[c] += static_cast<float>(share * l[c]);
           }
         }
       }

@@ -119,8 +119,7 @@ TEST(DiffuseTransmission, LightsWhatLiesBehind) {
     builder.add_box("room", {0, 0, 0}, {4, 3, 5}, builder.add_material("grey", {0.5, 0.5, 0.5}), true);
     builder.add_quad("curtain", {2, 0, 0}, {0, 3, 0}, {0, 0, 5}, add_leaf(builder, {0.3, 0.3, 0.3}, tau));
     builder.scene().lights.push_back({"lamp", PointLight{{1, 1.5, 2.5}, {100, 100, 100}}});
-    // The floor is one of the first six cells: of the texels of all walls, the right half's are lit through the
-    // curtain.
+    // Of all walls' texels the right half's are lit through the curtain alone.
     return baked(builder.scene(), {.atlas_size = 128, .rays = 256}).report.energy;
   };
   const auto dark = behind({0, 0, 0}), lit = behind({0.5, 0.5, 0.5});

@@ -22,8 +22,6 @@ import zlib
 import make_interior as kit
 from make_interior import add, scaled, sub
 
-SMOOTH = 1e-12
-
 
 def png(width, height, pixel, channels=3):
     """A PNG of pixel(x, y) -> channels bytes."""
@@ -142,23 +140,7 @@ class Writer(kit.Glb):
 
 def arrays(patches):
     """As of one sheet: each chart is its own unit square."""
-    positions, normals, coordinates, triangles = [], [], [], []
-    for p in patches:
-        base, columns = len(positions), len(p.points[0])
-        for j, row in enumerate(p.points):
-            positions += row
-            normals += p.normals[j]
-            coordinates += [(a, 1 - b) for a, b in p.chart[j]]
-        for j in range(len(p.points) - 1):
-            for i in range(columns - 1):
-                if p.skip(i, j):
-                    continue
-                a = base + j * columns + i
-                for t in ((a, a + 1, a + columns + 1), (a, a + columns + 1, a + columns)):
-                    c = [positions[k] for k in t]
-                    if kit.length(kit.cross(sub(c[1], c[0]), sub(c[2], c[0]))) > SMOOTH:
-                        triangles.append(t)
-    return positions, normals, coordinates, triangles
+    return kit.primitive_arrays(patches, [(0, 1, 1, -1, False)] * len(patches), 1)
 
 
 def shell(room, size, floor, ceiling, left, right, back, front):

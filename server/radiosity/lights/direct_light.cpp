@@ -88,8 +88,9 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
       lamps_.push_back({in_scene(spot->position), spot->intensity, spot->direction, true, outer,
                         1 / std::max(0.001, inner - outer)});
     } else if (const auto* luminaire = std::get_if<ProfileLight>(&light.kind)) {
+      const Vec3 across = cross(luminaire->zero_side, luminaire->direction);
       lamps_.push_back({in_scene(luminaire->position), luminaire->tint, luminaire->direction, false, 0, 0,
-                        luminaire->profile.get(), luminaire->zero_side, luminaire->is_mirrored});
+                        luminaire->profile.get(), luminaire->zero_side, luminaire->is_mirrored ? -across : across});
     } else {
       suns_.push_back(std::get<DirectionalLight>(light.kind));
     }
@@ -99,8 +100,7 @@ DirectLight::DirectLight(const Surfaces& surfaces, const Visibility& visibility,
 Vec3 DirectLight::Lamp::intensity_towards(Vec3 direction) const {
   const double cosine = dot(direction, axis);
   if (profile != nullptr) {
-    const double across = dot(direction, cross(zero_side, axis));
-    return intensity * profile->intensity(cosine, dot(direction, zero_side), is_mirrored ? -across : across);
+    return intensity * profile->intensity(cosine, dot(direction, zero_side), dot(direction, quarter_side));
   }
   if (!is_spot) return intensity;
   // Source: KHR_lights_punctual, inner and outer cone angles.

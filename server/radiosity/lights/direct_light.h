@@ -78,8 +78,8 @@ class DirectLight {
     bool is_spot = false;
     double outer_cosine = 0, per_ramp = 0;  ///< of a spot
     const LightProfile* profile = nullptr;  ///< of a luminaire
-    Vec3 zero_side = {};
-    bool is_mirrored = false;
+    Vec3 zero_side = {};                    ///< where its horizontal angle is 0
+    Vec3 quarter_side = {};                 ///< where it is 90 degrees
     /// In a direction away from it, unit length, cd.
     Vec3 intensity_towards(Vec3 direction) const;
   };

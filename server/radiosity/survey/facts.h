@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "server/radiosity/survey/survey.h"
-#include "server/radiosity/survey/texture.h"
 
 namespace radbake::radiosity {
 
@@ -47,9 +46,9 @@ inline bool is_opaque_in_fact(const Material& material, double least_opacity) {
 }
 
 /// Whether light goes through a material scattered: its texture may be black.
-inline bool is_translucent_in_fact(const Material& material, const Scene& scene) {
-  return max_component(
-             scaled_by(material.diffuse_transmittance, brightest(scene, material.diffuse_transmittance_texture))) > 0;
+/// Shapes: brightest value of its texture of diffuse transmittance, 1 without one.
+inline bool is_translucent_in_fact(const Material& material, Vec3 brightest) {
+  return max_component(scaled_by(material.diffuse_transmittance, brightest)) > 0;
 }
 
 /// Fills in what materials, textures and vertex colours tell. Everything is simulated in `surfaces`.

@@ -62,6 +62,15 @@ class MaterialFacts {
     return passes;
   }
 
+  /// By material: lets light through scattered.
+  std::vector<bool> passes_scattered() const {
+    std::vector<bool> passes;
+    for (const Material& material : scene_.materials) {
+      passes.push_back(is_translucent_in_fact(material, range_of_use(material.diffuse_transmittance_texture).high));
+    }
+    return passes;
+  }
+
  private:
   const Range& range_of_use(const std::optional<TextureReference>& use) const {
     return use ? ranges_[static_cast<std::size_t>(use->texture)] : one_;
@@ -140,10 +149,7 @@ class MaterialFacts {
 void find_material_facts(const Surfaces& surfaces, Survey& survey) {
   const MaterialFacts facts(surfaces, survey);
   const std::vector<bool> passes = facts.passes_by_alpha();
-  std::vector<bool> is_translucent;
-  for (const Material& material : surfaces.scene->materials) {
-    is_translucent.push_back(is_translucent_in_fact(material, *surfaces.scene));
-  }
+  const std::vector<bool> is_translucent = facts.passes_scattered();
   const double square_metres = surfaces.metres_per_unit * surfaces.metres_per_unit;
   for (std::uint32_t t = 0; t < surfaces.size(); ++t) {
     const int index = surfaces.mesh(t).material;

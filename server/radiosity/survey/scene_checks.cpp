@@ -59,8 +59,7 @@ Result<void> check_mesh(const Scene& scene, std::size_t m) {
   }
   // A textured material needs the coordinates that it names.
   const Material& material = scene.materials[mesh.material];
-  for (const auto& reference :
-       {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
+  for (const auto& reference : material.textures()) {
     if (reference && (reference->texcoord == 0 ? mesh.texcoord0 : mesh.texcoord1).empty() && !mesh.triangles.empty()) {
       return invalid_argument(name + ": its material uses a texture by TEXCOORD_" +
                               std::to_string(reference->texcoord) + ", which the mesh does not have");
@@ -99,8 +98,7 @@ Result<void> check_material(const Scene& scene, std::size_t i) {
   if (max_component(material.diffuse_transmittance) > 0 && !material.is_double_sided) {
     return invalid_argument(name + ": light goes through it scattered, but it is single-sided");
   }
-  for (const auto& reference :
-       {material.reflectance_texture, material.emissive_texture, material.diffuse_transmittance_texture}) {
+  for (const auto& reference : material.textures()) {
     if (!reference) continue;
     if (reference->texture < 0 || static_cast<std::size_t>(reference->texture) >= scene.textures.size()) {
       return invalid_argument(name + ": texture " + std::to_string(reference->texture) + " does not exist; there are " +

@@ -58,7 +58,7 @@ void Surfaces::simulate(const EffectSet& set) {
     if (!set.has(Effect::kTint)) material.transmittance = {};
     // Through what has no back nothing comes.
     if (!set.has(Effect::kDiffuseTransmission) || !set.has(Effect::kTwoSided) ||
-        !is_translucent_in_fact(material, *scene)) {
+        !is_translucent_in_fact(material, brightest(*scene, material.diffuse_transmittance_texture))) {
       material.diffuse_transmittance = {};
     }
     if (!set.has(Effect::kTwoSided)) material.is_double_sided = false;

@@ -212,13 +212,15 @@ TEST(UntrustedScene, NamesTheLimitAndTheValue) {
   EXPECT_THAT(limited([](auto& l) { l.set_max_manifest_bytes(10); }), HasSubstr("max_manifest_bytes is 10"));
 }
 
+/// A change of a good manifest, and what the error says of it.
+struct Case {
+  std::function<void(v1::SceneManifest&)> change;
+  const char* message;
+};
+
 TEST(UntrustedScene, ChecksEveryValueOfTheManifest) {
   using M = v1::SceneManifest;
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  struct Case {
-    std::function<void(M&)> change;
-    const char* message;
-  };
   const Case cases[] = {
       {[](M& m) { m.clear_meshes(); }, "the scene has no mesh"},
       {[=](M& m) { m.mutable_origin()->set_y(nan); }, "the origin has position (2, nan,"},
@@ -284,10 +286,6 @@ TEST(UntrustedScene, RefusesTexelsThatAreNoLight) {
 
 TEST(UntrustedScene, ChecksEveryValueOfASky) {
   using M = v1::SceneManifest;
-  struct Case {
-    std::function<void(M&)> change;
-    const char* message;
-  };
   const Case cases[] = {
       {[](M& m) { m.mutable_environment()->set_width(0); }, "the environment 'dawn' is 0 x 2 pixels: it has none"},
       {[](M& m) { m.mutable_environment()->set_height(3); },
@@ -313,10 +311,6 @@ TEST(UntrustedScene, ChecksEveryValueOfASky) {
 TEST(UntrustedScene, ChecksEveryValueOfALuminaire) {
   using M = v1::SceneManifest;
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  struct Case {
-    std::function<void(M&)> change;
-    const char* message;
-  };
   const Case cases[] = {
       {[](M& m) { m.mutable_lights(1)->mutable_profile()->set_profile(2); }, "light 'two' has profile 2 of 2"},
       {[](M& m) { m.clear_light_profiles(); }, "light 'one' has profile 0 of 0"},

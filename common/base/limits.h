@@ -23,6 +23,7 @@ struct Limits {
   std::uint64_t max_patches = 1'000'000;
   std::uint64_t max_queued_bakes = 1000;
   std::uint64_t max_running_bakes = 1;
+  std::uint64_t max_content_bytes = 0;  ///< of a tenant's blobs, uploads included; 0: as the disk has
 };
 
 /// Copies limits into a message with the same fields: limits_message<v1::Limits>(limits). A template, so that this
@@ -47,6 +48,7 @@ Message limits_message(const Limits& limits) {
   message.set_max_patches(limits.max_patches);
   message.set_max_queued_bakes(limits.max_queued_bakes);
   message.set_max_running_bakes(limits.max_running_bakes);
+  message.set_max_content_bytes(limits.max_content_bytes);
   return message;
 }
 

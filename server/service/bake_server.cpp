@@ -69,9 +69,11 @@ Result<std::unique_ptr<BakeServer>> BakeServer::start(BakeServerOptions options)
 
 Result<void> BakeServer::open_stores(const BakeServerOptions& options) {
   RADBAKE_ASSIGN_OR_RETURN(lock_, lock_folder(options.data));
-  RADBAKE_ASSIGN_OR_RETURN(content_,
-                           store::ContentStore::open(options.data / "content", options.limits.max_blob_bytes));
+  RADBAKE_ASSIGN_OR_RETURN(
+      content_, store::TenantContent::open(options.data / "content",
+                                           {options.limits.max_blob_bytes, options.limits.max_content_bytes}));
   RADBAKE_ASSIGN_OR_RETURN(jobs_, store::JobStore::open(options.data / "jobs.sqlite"));
+  housekeeping_ = std::make_unique<jobs::Housekeeping>(options.housekeeping, *jobs_, *content_);
   return {};
 }
 

@@ -3,8 +3,8 @@
 #include "common/base/limits.h"
 #include "radbake/v1/bake.grpc.pb.h"
 #include "server/jobs/job_queue.h"
-#include "server/store/content_store.h"
 #include "server/store/task_pool.h"
+#include "server/store/tenant_content.h"
 
 namespace radbake::service {
 
@@ -12,7 +12,7 @@ namespace radbake::service {
 class BakesService : public v1::Bakes::CallbackService {
  public:
   /// max_threads: of a bake; 0: as many as it asks for.
-  BakesService(jobs::JobQueue& queue, store::ContentStore& content, store::TaskPool& pool, const Limits& limits,
+  BakesService(jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool, const Limits& limits,
                std::uint32_t max_threads)
       : queue_(queue), content_(content), pool_(pool), limits_(limits), max_threads_(max_threads) {}
 
@@ -32,7 +32,7 @@ class BakesService : public v1::Bakes::CallbackService {
                                                              const v1::WatchBakeRequest* request) override;
 
  private:
-  grpc::Status submit(const v1::SubmitBakeRequest& request, v1::Bake& bake);
+  grpc::Status submit(const grpc::CallbackServerContext& context, const v1::SubmitBakeRequest& request, v1::Bake& bake);
   /// Checks a submit as far as nothing is queued. known: the bake that the same request created before; then the rest
   /// of the job is not filled in.
   grpc::Status admit(const v1::SubmitBakeRequest& request, store::NewJob& job, std::shared_ptr<jobs::Job>& known);
@@ -45,7 +45,7 @@ class BakesService : public v1::Bakes::CallbackService {
   grpc::ServerUnaryReactor* run_on_pool(grpc::CallbackServerContext* context, Body body);
 
   jobs::JobQueue& queue_;
-  store::ContentStore& content_;
+  store::TenantContent& content_;
   store::TaskPool& pool_;
   const Limits limits_;
   const std::uint32_t max_threads_;

@@ -71,7 +71,7 @@ ExitCode run_submit(const CommandContext& context) {
   if (!line.detach) {
     Result<ResultFolder> opened = ResultFolder::open(line.folder, line.force);
     if (!opened.ok()) return fail(context, opened.error(), kUsage);
-    folder = std::move(opened).value();
+    folder.emplace(std::move(opened).value());
   }
   Stopwatch stages;
   context.reporter.stage("connecting", -1);

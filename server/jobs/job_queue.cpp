@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/log/log.h"
+
 namespace radbake::jobs {
 
 using store::JobRecord;
@@ -23,7 +25,14 @@ Result<void> JobQueue::start(WorkerGate& gate) {
   gate_ = &gate;
   raise_open_file_limit();
   watchdog_ = std::jthread([this](std::stop_token stop) { watch_limits(stop); });
-  return thread_.run([this] { return recover(); });
+  RADBAKE_RETURN_IF_ERROR(thread_.run([this] { return recover(); }));
+  has_recovered_ = true;
+  return {};
+}
+
+Result<void> JobQueue::check_recovered() const {
+  if (has_recovered_) return {};
+  return Error{ErrorCode::kUnavailable, "the server is starting and takes up its bakes: try again"};
 }
 
 Result<void> JobQueue::recover() {
@@ -56,7 +65,7 @@ Result<void> JobQueue::recover() {
 
 void JobQueue::make_worker_ready() {
   // Not beside work, which it would take time from.
-  if (!options_.keeps_worker_ready || ready_ || is_draining_ || !runs_.empty()) return;
+  if (!options_.keeps_worker_ready || ready_ || is_refusing_ || is_draining_ || !runs_.empty()) return;
   auto worker = ReadyWorker::start(options_.worker);
   if (worker.ok()) {
     ready_ = std::move(worker).value();
@@ -66,6 +75,7 @@ void JobQueue::make_worker_ready() {
 }
 
 Result<std::shared_ptr<Job>> JobQueue::find_request(const std::string& request_id, const std::string& body_sha256) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
   RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> record, store_.find_request(request_id, body_sha256));
   if (!record) return std::shared_ptr<Job>();
   return find(record->name);
@@ -78,13 +88,17 @@ Result<std::shared_ptr<Job>> JobQueue::submit(const store::NewJob& job) {
 Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) {
   RADBAKE_ASSIGN_OR_RETURN(const std::shared_ptr<Job> known, find_request(new_job.request_id, new_job.body_sha256));
   if (known) return known;
-  if (is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: submit again later"};
+  if (is_refusing_ || is_draining_) {
+    return Error{ErrorCode::kUnavailable, "the server is stopping: submit again later"};
+  }
   if (waiting_.size() >= options_.max_queued) {
     return Error{ErrorCode::kResourceExhausted, std::to_string(waiting_.size()) +
                                                     " bakes are waiting, max_queued_bakes is " +
                                                     std::to_string(options_.max_queued)};
   }
-  RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job));
+  RADBAKE_ASSIGN_OR_RETURN(JobRecord record, store_.create(new_job));
+  record.trace_id = new_job.trace_id;
+  const LogTrace trace(record.trace_id);
   RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
   const auto job = std::make_shared<Job>(record, std::move(events));
   {
@@ -111,6 +125,7 @@ std::shared_ptr<WorkerRun> JobQueue::find_run(const std::string& name) const {
 }
 
 Result<std::shared_ptr<Job>> JobQueue::find(const std::string& name) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
   if (auto live = find_live(name)) return live;
   // It has ended, or never was: a view of what is stored.
   RADBAKE_ASSIGN_OR_RETURN(JobRecord record, store_.get(name));
@@ -165,7 +180,7 @@ void JobQueue::finish_live(const std::string& name) {
 }
 
 void JobQueue::run_waiting_jobs() {
-  while (!is_draining_ && !waiting_.empty() && num_running_ < options_.max_running) {
+  while (!is_refusing_ && !is_draining_ && !waiting_.empty() && num_running_ < options_.max_running) {
     const std::shared_ptr<Job> job = waiting_.front();
     waiting_.pop_front();
     start_job(job);
@@ -218,9 +233,10 @@ void JobQueue::start_job(const std::shared_ptr<Job>& job) {
     thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
   };
   events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
-  const auto run = std::make_shared<WorkerRun>(
-      WorkerRun::Assignment{name, record.attempt, false, record.work, std::nullopt, record.created_unix_ms},
-      options_.worker, content_, std::move(events));
+  const auto run =
+      std::make_shared<WorkerRun>(WorkerRun::Assignment{name, record.attempt, false, record.work, std::nullopt,
+                                                        record.created_unix_ms, record.trace_id},
+                                  options_.worker, content_, std::move(events));
   if (to_finish_.contains(name)) run->request_finish();
   add_run(run);
   ++num_running_;
@@ -242,10 +258,19 @@ void JobQueue::advance(const std::string& name, JobState state) {
 }
 
 Result<void> JobQueue::change(const std::shared_ptr<Job>& job, StateChange change) {
-  const std::string name = job->record().name;
+  const JobRecord before = job->record();
+  const std::string& name = before.name;
+  const LogTrace trace(before.trace_id);
   if (change.message.empty()) change.message = job_state_name(change.state);
+  const std::int64_t entered_unix_ms = job->entered_unix_ms();
   RADBAKE_ASSIGN_OR_RETURN(store::RecordedChange recorded, store_.append_event(name, change));
+  recorded.record.trace_id = before.trace_id;
   const JobRecord& record = recorded.record;
+  if (options_.observer != nullptr) {
+    constexpr double kMsPerSecond = 1000;
+    options_.observer->state_changed(before.state, record.state,
+                                     static_cast<double>(recorded.event.unix_ms - entered_unix_ms) / kMsPerSecond);
+  }
   spdlog::info("{} {} (attempt {}): {}", name, job_state_name(record.state), record.attempt,
                record.error ? record.error->message : change.message);
   const bool has_ended = is_terminal(record.state);
@@ -300,12 +325,14 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   const auto run = find_run(name);
   if (!run) return;
   const std::string killed_because = run->kill_reason();
+  const LogTrace trace(run->assignment().trace_id);
   const std::string reason =
       "the worker " + (killed_because.empty() ? exit.reason : killed_because + " and was stopped");
   if (run->assignment().is_plan) {
     finish_plan(name, run->is_cancel_requested() ? Error{ErrorCode::kCancelled, "cancelled"} : internal_error(reason));
   } else {
     --num_running_;
+    if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
     // Whoever still lives here got no outcome from its worker.
     if (const auto job = find_live(name)) {
       const JobRecord record = job->record();
@@ -338,12 +365,13 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   make_worker_ready();
 }
 
-Result<std::string> JobQueue::start_plan(const store::Work& work, PlanDone on_done) {
-  return thread_.run([&] { return start_plan_run(work, std::move(on_done)); });
+Result<std::string> JobQueue::start_plan(const store::Work& work, const std::string& trace_id, PlanDone on_done) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
+  return thread_.run([&] { return start_plan_run(work, trace_id, std::move(on_done)); });
 }
 
-Result<std::string> JobQueue::start_plan_run(const store::Work& work, PlanDone on_done) {
-  if (is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
+Result<std::string> JobQueue::start_plan_run(const store::Work& work, const std::string& trace_id, PlanDone on_done) {
+  if (is_refusing_ || is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
   if (plans_.size() >= options_.max_running_plans) {
     return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
                                                     " plans are being made, max_running_plans is " +
@@ -357,8 +385,9 @@ Result<std::string> JobQueue::start_plan_run(const store::Work& work, PlanDone o
     thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
   };
   events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
-  const auto run = std::make_shared<WorkerRun>(WorkerRun::Assignment{name, 1, true, work, options_.plan_limit, 0},
-                                               options_.worker, content_, std::move(events));
+  const auto run =
+      std::make_shared<WorkerRun>(WorkerRun::Assignment{name, 1, true, work, options_.plan_limit, 0, trace_id},
+                                  options_.worker, content_, std::move(events));
   add_run(run);
   if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
     const std::lock_guard lock(mutex_);

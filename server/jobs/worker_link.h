@@ -33,6 +33,7 @@ struct WorkOrder {
   store::Work work;
   std::vector<InputFile> inputs;
   double waited_seconds = 0;  ///< since the job was accepted
+  std::string trace_id;       ///< of the call that asked for it
 };
 
 /// Part of a result blob. Parts follow each other without a gap.

@@ -5,6 +5,7 @@
 
 #include "server/service/convert.h"
 #include "server/service/plan_reactor.h"
+#include "server/service/rpc_watch.h"
 #include "server/service/scene_check.h"
 #include "server/service/status.h"
 #include "server/service/watch_reactor.h"
@@ -38,11 +39,13 @@ grpc::ServerUnaryReactor* BakesService::run_on_pool(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* BakesService::SubmitBake(grpc::CallbackServerContext* context,
                                                    const v1::SubmitBakeRequest* request, v1::Bake* bake) {
   if (request->validate_only()) return validate(context, *request, *bake);
-  return run_on_pool(context, [this, request, bake] { return submit(*request, *bake); });
+  return run_on_pool(context,
+                     [this, context, request, bake] { return submit(*request, trace_id_of(*context), *bake); });
 }
 
-grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, v1::Bake& bake) {
+grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, const std::string& trace_id, v1::Bake& bake) {
   store::NewJob job;
+  job.trace_id = trace_id;
   std::shared_ptr<jobs::Job> known;
   if (auto status = admit(request, job, known); !status.ok()) return status;
   return known ? reply(known, bake) : reply(queue_.submit(job), bake);
@@ -62,7 +65,7 @@ grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* co
       *bake.mutable_manifest() = request.manifest();
       *bake.mutable_settings() = request.settings();
     }
-    reactor->begin(status, job.work);
+    reactor->begin(status, job.work, trace_id_of(*context));
   });
   return reactor;
 }
@@ -84,6 +87,9 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
   if (!found.ok()) return to_status(found.error());
   known = *found;
   if (known) return grpc::Status::OK;
+  if (auto room = disk_.admit(); !room.ok() && !request.validate_only()) {
+    return to_status(room.error(), "min_free_disk_bytes");
+  }
 
   if (auto status = check_scene({request.manifest(), request.settings(), request.run()}, limits_, max_threads_,
                                 content_, job.work);
@@ -105,7 +111,7 @@ grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* co
       status = check_scene({request->manifest(), request->settings(), request->run()}, limits_, max_threads_, content_,
                            work);
     }
-    reactor->begin(status, work);
+    reactor->begin(status, work, trace_id_of(*context));
   });
   return reactor;
 }

@@ -48,6 +48,8 @@ class ContentStore {
   Result<void> finish_upload(const Digest& digest);
   /// Committed bytes survive a broken connection, not the end of the server.
   UploadProgress query_upload(const Digest& digest) const;
+  /// Received of all uploads that are not complete.
+  std::uint64_t upload_bytes() const;
 
   /// A blob whose digest is known only when its last byte is: a result.
   Result<std::unique_ptr<BlobWriter>> new_blob();

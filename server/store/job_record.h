@@ -41,6 +41,7 @@ struct NewJob {
   std::string body_sha256;  ///< of the request: the same id with another body is refused
   std::string label;
   std::string bake_key;
+  std::string trace_id;  ///< of the call that submitted it
   Work work;
 };
 
@@ -50,6 +51,7 @@ struct JobRecord {
   std::string name;     ///< bakes/<16 hexadecimal digits>
   std::string label;
   std::string bake_key;
+  std::string trace_id;  ///< of the call that submitted it, while the server that took it lives
   Work work;
   JobState state = JobState::kQueued;
   std::uint32_t attempt = 1;        ///< the run of a worker that is going on, or the next one

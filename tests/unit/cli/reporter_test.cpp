@@ -49,14 +49,14 @@ void run_of_a_submit(Reporter& reporter) {
 }
 
 TEST(JsonReporter, PrintsOneEventALineAndTheJobFirst) {
-  const auto reporter = make_json_reporter(true);
+  const auto reporter = make_json_reporter(true, kTrace);
   std::vector<std::string> events;
   for (const std::string& line : stdout_of(*reporter, run_of_a_submit)) events.push_back(Json::parse(line)["event"]);
   EXPECT_THAT(events, ElementsAre("submitted", "warning", "snapshot", "state", "progress", "finished", "written"));
 }
 
 TEST(JsonReporter, PrintsExactlyOneObjectForACommandThatIsNoStream) {
-  const auto downloads = make_json_reporter(false);
+  const auto downloads = make_json_reporter(false, kTrace);
   const auto lines = stdout_of(*downloads, [](Reporter& reporter) {
     reporter.stage("downloading", -1);
     reporter.note("a note");
@@ -65,7 +65,7 @@ TEST(JsonReporter, PrintsExactlyOneObjectForACommandThatIsNoStream) {
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(Json::parse(lines[0])["files"][0], "report.json");
 
-  const auto fails = make_json_reporter(false);
+  const auto fails = make_json_reporter(false, kTrace);
   const auto failure = stdout_of(*fails, [](Reporter& reporter) {
     reporter.failed({ErrorCode::kUnavailable, "nobody there"}, kServerUnreachable);
   });

@@ -43,5 +43,24 @@ TEST(Log, RefusesALevelThatDoesNotExist) {
   EXPECT_THAT(refused.error().message, ::testing::HasSubstr("'loud'"));
 }
 
+TEST(Log, SaysTheTraceOfTheInnermostScope) {
+  const LogTrace outer("0af7651916cd43dd8448eb211c80319c");
+  {
+    const LogTrace inner("4bf92f3577b34da6a3ce929d0e0e4736");
+    EXPECT_EQ(nlohmann::json::parse(logged(true, "info", "hello"))["trace_id"], "4bf92f3577b34da6a3ce929d0e0e4736");
+    const LogTrace none("");
+    EXPECT_THAT(logged(false, "info", "hello"),
+                ::testing::EndsWith("hello [trace 4bf92f3577b34da6a3ce929d0e0e4736]\n"));
+  }
+  EXPECT_EQ(nlohmann::json::parse(logged(true, "info", "hello"))["trace_id"], "0af7651916cd43dd8448eb211c80319c");
+}
+
+TEST(Log, SaysTheProgramsTraceWhereNoScopeDoes) {
+  set_program_trace("0af7651916cd43dd8448eb211c80319c");
+  EXPECT_EQ(nlohmann::json::parse(logged(true, "info", "hello"))["trace_id"], "0af7651916cd43dd8448eb211c80319c");
+  set_program_trace("");
+  EXPECT_FALSE(nlohmann::json::parse(logged(true, "info", "hello")).contains("trace_id"));
+}
+
 }  // namespace
 }  // namespace radbake

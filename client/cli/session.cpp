@@ -56,7 +56,8 @@ Result<Session> open_session(const CommandContext& context) {
     private_server.emplace(std::move(started).value());
     address = private_server->address();
   }
-  Result<api::Client> client = api::Client::connect(address, client_options(context.line, context.trace), context.interrupt.once());
+  Result<api::Client> client =
+      api::Client::connect(address, client_options(context.line, context.trace), context.interrupt.once());
   if (!client.ok()) {
     Error error = client.error();
     if (private_server) error.message += private_server->log_tail();

@@ -93,8 +93,10 @@ class JobQueue {
 
   QueueStats stats() const;
 
-  /// From now on refuses jobs and plans and starts none that wait; lets bakes run whose workers say that they will be
-  /// done before the grace is over. Returns when no such bake is left; drain() ends the others.
+  /// From now on refuses jobs and plans and starts none that wait; what runs goes on.
+  void refuse_new();
+  /// After refuse_new(): waits for the bakes whose workers say that they will be done before the grace is over. Returns
+  /// when no such bake is left; drain() ends the others.
   void let_finish(std::chrono::milliseconds grace);
 
   /// Stops for good: refuses new jobs, kills workers and queues their jobs again, lets watchers go. Returns when no
@@ -139,7 +141,7 @@ class JobQueue {
   std::map<std::string, std::shared_ptr<Job>> live_;        // every job that has not ended
   std::map<std::string, std::shared_ptr<WorkerRun>> runs_;  // of jobs and plans
   bool is_draining_ = false;
-  bool is_refusing_ = false;  // from let_finish() on
+  bool is_refusing_ = false;  // from refuse_new() on
 
   // Touched on thread_ alone.
   std::deque<std::shared_ptr<Job>> waiting_;

@@ -33,14 +33,17 @@ bool JobQueue::will_finish_before(WorkerRun::Clock::time_point limit) const {
   });
 }
 
-void JobQueue::let_finish(std::chrono::milliseconds grace) {
-  // Predictions change: look again, but not so often that it costs anything.
-  constexpr std::chrono::milliseconds kLookInterval{20};
-  const auto limit = WorkerRun::Clock::now() + grace;
+void JobQueue::refuse_new() {
   thread_.run([this] {
     const std::lock_guard lock(mutex_);
     is_refusing_ = true;
   });
+}
+
+void JobQueue::let_finish(std::chrono::milliseconds grace) {
+  // Predictions change: look again, but not so often that it costs anything.
+  constexpr std::chrono::milliseconds kLookInterval{20};
+  const auto limit = WorkerRun::Clock::now() + grace;
   std::unique_lock lock(mutex_);
   while (will_finish_before(limit)) runs_changed_.wait_for(lock, kLookInterval);
 }

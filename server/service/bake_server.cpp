@@ -170,6 +170,7 @@ BakeServer::~BakeServer() {
 
 void BakeServer::stop() {
   if (!server_) return;
+  queue_->refuse_new();
   readiness_.set(Obstacle::kDraining, "the server is stopping");
   queue_->let_finish(options_.drain_grace);
   queue_->drain();

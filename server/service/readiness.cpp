@@ -26,7 +26,9 @@ void Readiness::set(Obstacle obstacle, const std::string& why) {
 void Readiness::clear(Obstacle obstacle) {
   const std::lock_guard lock(mutex_);
   const bool was_ready = obstacles_.empty();
-  if (obstacles_.erase(obstacle) > 0) spdlog::info("no longer {}", obstacle_name(obstacle));
+  // Every start recovers: nothing to tell.
+  const auto level = obstacle == Obstacle::kRecovering ? spdlog::level::debug : spdlog::level::info;
+  if (obstacles_.erase(obstacle) > 0) spdlog::log(level, "no longer {}", obstacle_name(obstacle));
   tell(was_ready);
 }
 

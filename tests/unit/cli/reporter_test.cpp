@@ -13,6 +13,8 @@ using Json = nlohmann::ordered_json;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
+constexpr const char* kTrace = "4bf92f3577b34da6a3ce929d0e0e4736";
+
 v1::Bake bake() {
   v1::Bake bake;
   bake.set_name("bakes/1");
@@ -51,7 +53,9 @@ void run_of_a_submit(Reporter& reporter) {
 TEST(JsonReporter, PrintsOneEventALineAndTheJobFirst) {
   const auto reporter = make_json_reporter(true, kTrace);
   std::vector<std::string> events;
-  for (const std::string& line : stdout_of(*reporter, run_of_a_submit)) events.push_back(Json::parse(line)["event"]);
+  const auto lines = stdout_of(*reporter, run_of_a_submit);
+  for (const std::string& line : lines) events.push_back(Json::parse(line)["event"]);
+  EXPECT_EQ(Json::parse(lines[0])["trace_id"], kTrace);
   EXPECT_THAT(events, ElementsAre("submitted", "warning", "snapshot", "state", "progress", "finished", "written"));
 }
 
@@ -74,6 +78,7 @@ TEST(JsonReporter, PrintsExactlyOneObjectForACommandThatIsNoStream) {
   EXPECT_EQ(error["exit_code"], 4);
   EXPECT_EQ(error["code"], "unavailable");
   EXPECT_EQ(error["message"], "nobody there");
+  EXPECT_EQ(error["trace_id"], kTrace);
 }
 
 TEST(TextReporter, PrintsTheJobFirstAndTheFilesLastOnStdout) {

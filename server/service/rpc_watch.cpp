@@ -1,7 +1,9 @@
 #include "server/service/rpc_watch.h"
 
+#include <google/protobuf/descriptor.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <iterator>
@@ -27,11 +29,16 @@ std::optional<TraceContext> find_trace(const Metadata& metadata) {
   return parse_traceparent(std::string_view(begin->second.data(), begin->second.size()));
 }
 
-/// "radbake.v1.Bakes/SubmitBake"; "other" for what is not ours: a label must not be a client's to choose.
+/// "radbake.v1.Bakes/SubmitBake"; "other" for a method that this server does not have: a label must not be a client's
+/// to choose.
 std::string method_label(const char* method) {
-  std::string_view name = method == nullptr ? "" : method;
-  if (name.starts_with('/')) name.remove_prefix(1);
-  return name.starts_with("radbake.v1.") || name.starts_with("grpc.") ? std::string(name) : "other";
+  std::string name = method == nullptr ? "" : method;
+  if (name.starts_with('/')) name.erase(0, 1);
+  if (name == "grpc.health.v1.Health/Check" || name == "grpc.health.v1.Health/Watch") return name;
+  std::string full_name = name;
+  std::replace(full_name.begin(), full_name.end(), '/', '.');
+  const auto* known = google::protobuf::DescriptorPool::generated_pool()->FindMethodByName(full_name);
+  return known == nullptr ? "other" : name;
 }
 
 spdlog::level::level_enum level_of(grpc::StatusCode code) {

@@ -41,8 +41,8 @@ struct NewJob {
   std::string body_sha256;  ///< of the request: the same id with another body is refused
   std::string label;
   std::string bake_key;
-  std::string trace_id;  ///< of the call that submitted it
   Work work;
+  std::string trace_id{};  ///< of the call that submitted it
 };
 
 /// A job as it is stored.

@@ -676,11 +676,8 @@ class SharedServer(CliTest):
                 self.assertTrue(line.endswith(f"[trace {submitted['trace_id']}]"), line)
 
     def test_a_bake_that_fails_names_its_trace(self):
-        scene = self.place / "one.gltf"
-        scene.write_text(json.dumps(cli_scenes.square()))
-        # A ceiling of memory that no bake keeps.
-        result = self.run_cli("submit", scene, "-o", self.place / "out", "--json", "--memory", "1K", *SMALL)
-        self.assertNotEqual(result.returncode, 0)
+        result = self.run_cli("submit", CORNELL, "-o", self.place / "out", "--json", "--effect", "sun=on", *QUICK)
+        self.assert_exit(result, 3)
         error = json.loads(result.stdout.splitlines()[-1])["error"]
         self.assertRegex(error["trace_id"], "^[0-9a-f]{32}$")
         self.assertTrue(error["message"].endswith(f"[trace {error['trace_id']}]"), error)

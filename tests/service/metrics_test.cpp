@@ -1,6 +1,7 @@
 // What /metrics says of bakes, calls and the process.
 
 #include <gmock/gmock.h>
+#include <grpcpp/impl/codegen/client_unary_call.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -153,6 +154,7 @@ TEST_F(MetricsTest, LetsNoClientInventALabel) {
   EXPECT_EQ(
       grpc::internal::BlockingUnaryCall(client_.channel.get(), method, new_context().get(), bake, &bake).error_code(),
       grpc::StatusCode::UNIMPLEMENTED);
+  EXPECT_TRUE(becomes("radbake_rpcs_total{code=\"UNIMPLEMENTED\",method=\"other\"}", 1));
   EXPECT_THAT(page(), Not(HasSubstr("Invented")));
 }
 

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -13,6 +14,13 @@ namespace {
 
 thread_local std::string thread_trace;
 std::string program_trace;
+
+/// Control characters as spaces: what a client wrote must not look like a line of ours.
+std::string in_one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char letter) { return letter < 0x20 || letter == 0x7f; }, ' ');
+  return text;
+}
 
 /// Formats a line as text or as a JSON object. spdlog's own patterns do not escape the message.
 class LineFormatter : public spdlog::formatter {
@@ -40,7 +48,7 @@ class LineFormatter : public spdlog::formatter {
       object["message"] = message;
       text = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
     } else {
-      text = fmt::format("{} {} {}: {}{}\n", time, level, program_, message,
+      text = fmt::format("{} {} {}: {}{}\n", time, level, program_, in_one_line(message),
                          trace.empty() ? "" : " [trace " + trace + "]");
     }
     out.append(text.data(), text.data() + text.size());

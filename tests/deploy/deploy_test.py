@@ -3,10 +3,13 @@
 
   deploy_test.py BIN_FOLDER SUITE
 """
+import contextlib
+import hashlib
 import json
 import pathlib
 import re
 import shutil
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -18,6 +21,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 DEPLOY = ROOT / "deploy"
 RADBAKED = pathlib.Path()
 EXIT_SKIPPED = 77
+# For what must not hang.
+CALL_SECONDS = 240
 
 KEY_LINE = re.compile(r"^(# )?([a-z-]+)=(.*)$", re.M)
 METRIC = re.compile(r"\bradbake_[a-z_]+\b")
@@ -136,6 +141,48 @@ class Systemd(unittest.TestCase):
         unit = (DEPLOY / "systemd/radbaked.service").read_text()
         grace = float(dict((k, v) for _, k, v in KEY_LINE.findall(run("--print-config").stdout))["drain-grace"])
         self.assertGreater(int(re.search(r"^TimeoutStopSec=(\d+)$", unit, re.M)[1]), grace)
+
+
+class Backup(unittest.TestCase):
+    def start(self, place, data):
+        server = subprocess.Popen([RADBAKED, "--listen", f"unix:{place}/socket", "--data", data],
+                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        self.addCleanup(server.stdout.close)
+        self.addCleanup(server.wait)
+        self.addCleanup(server.kill)
+        self.assertIn("listening on", server.stdout.readline())
+        return server
+
+    def run_radbake(self, place, *arguments):
+        done = subprocess.run([RADBAKED.parent / "radbake", *map(str, arguments), "--server", f"unix:{place}/socket"],
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=CALL_SECONDS)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def test_a_backup_of_a_running_server_is_restored_as_the_page_says(self):
+        with tempfile.TemporaryDirectory() as folder:
+            place = pathlib.Path(folder)
+            server = self.start(place, place / "data")
+            scene = ROOT / "tests/scenes/cornell.glb"
+            name = self.run_radbake(place, "submit", scene, "-o", place / "first", "--atlas-size", 64, "--rays", 16,
+                                    "--max-patches", 300).splitlines()[0]
+            # First the database, by SQLite's own backup, then the content.
+            (place / "backup").mkdir()
+            with contextlib.closing(sqlite3.connect(place / "data/jobs.sqlite")) as source, \
+                    contextlib.closing(sqlite3.connect(place / "backup/jobs.sqlite")) as copy:
+                source.backup(copy)
+            shutil.copytree(place / "data/content/objects", place / "backup/content/objects")
+            server.kill()
+            server.wait()
+            shutil.rmtree(place / "data")
+
+            self.start(place, place / "backup")
+            self.run_radbake(place, "download", name, "-o", place / "second")
+            maps = [(place / run / "lightmap_0.exr").read_bytes() for run in ("first", "second")]
+            self.assertEqual(maps[0], maps[1])
+            for blob in (place / "backup/content/objects").rglob("*"):
+                if blob.is_file():
+                    self.assertEqual(hashlib.sha256(blob.read_bytes()).hexdigest(), blob.name)
 
 
 def main():

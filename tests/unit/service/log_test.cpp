@@ -32,6 +32,12 @@ TEST(Log, WritesOneJsonObjectALineWhateverTheMessageHolds) {
   EXPECT_THAT(object["message"].get<std::string>(), ::testing::StartsWith("quote \" backslash \\ line\nbreak \x01 "));
 }
 
+TEST(Log, WritesOneTextLineWhateverTheMessageHolds) {
+  const std::string line = logged(false, "info", "a label\n2026-01-31T12:00:00.123Z info radbaked: forged\x1b[2K\r");
+  EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1);
+  EXPECT_THAT(line, ::testing::HasSubstr("a label 2026-01-31T12:00:00.123Z info radbaked: forged [2K "));
+}
+
 TEST(Log, KeepsToItsLevel) {
   EXPECT_EQ(logged(false, "error", "hello"), "");
   EXPECT_THAT(logged(false, "debug", "hello"), ::testing::HasSubstr("hidden"));

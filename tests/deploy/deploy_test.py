@@ -21,6 +21,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 DEPLOY = ROOT / "deploy"
 RADBAKED = pathlib.Path()
 EXIT_SKIPPED = 77
+# systemd's own measure, 0 to 100: a unit that says nothing has 96.
+MAX_EXPOSURE = 20
 # For what must not hang.
 CALL_SECONDS = 240
 
@@ -136,6 +138,11 @@ class Systemd(unittest.TestCase):
             wrong = subprocess.run(["systemd-analyze", "verify", "--man=no", "--recursive-errors=no", path],
                                    capture_output=True, text=True, timeout=50)
             self.assertIn("notifies", wrong.stderr)
+
+    def test_the_unit_leaves_the_server_little_that_it_could_do_to_the_machine(self):
+        rated = subprocess.run(["systemd-analyze", "security", "--offline=true", f"--threshold={MAX_EXPOSURE}",
+                                DEPLOY / "systemd/radbaked.service"], capture_output=True, text=True, timeout=50)
+        self.assertEqual(rated.returncode, 0, rated.stdout + rated.stderr)
 
     def test_the_unit_waits_longer_than_the_server_may_take_to_stop(self):
         unit = (DEPLOY / "systemd/radbaked.service").read_text()

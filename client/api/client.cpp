@@ -1,14 +1,12 @@
 #include "client/api/client.h"
 
 #include <grpc/grpc.h>
-#include <sys/random.h>
 
-#include <array>
 #include <mutex>
 #include <utility>
 
 #include "client/api/connection.h"
-#include "common/base/check.h"
+#include "common/base/trace.h"
 #include "common/base/version.h"
 
 namespace radbake::api {
@@ -21,6 +19,7 @@ constexpr int kMaxReconnectMs = 1000;
 constexpr int kKeepaliveMs = 60000, kKeepaliveTimeoutMs = 20000;
 /// The largest answer is a page of bakes or a plan with its warnings.
 constexpr int kMaxReceiveBytes = 4 << 20;
+constexpr std::size_t kRequestIdBytes = 16;
 
 /// gRPC's target for an address as people write it.
 std::string target_of(const std::string& address) {
@@ -41,8 +40,9 @@ void keep_grpc_up() {
 
 }  // namespace
 
-Call::Call(std::stop_token stop) : on_stop_(std::move(stop), Cancel{&context_}) {
+Call::Call(const Connection& connection, std::stop_token stop) : on_stop_(std::move(stop), Cancel{&context_}) {
   context_.AddMetadata("radbake-protocol", std::to_string(kProtocolMajor));
+  if (!connection.options.traceparent.empty()) context_.AddMetadata("traceparent", connection.options.traceparent);
 }
 
 Error Connection::describe(const grpc::Status& status) const {
@@ -156,16 +156,6 @@ Result<v1::Bake> Client::finish(const std::string& name, std::stop_token stop) {
       [&](auto* context, auto* response) { return connection_->bakes->FinishBake(context, request, response); });
 }
 
-std::string make_request_id() {
-  std::array<unsigned char, 16> random{};
-  RADBAKE_CHECK_EQ(getrandom(random.data(), random.size(), 0), static_cast<ssize_t>(random.size()));
-  constexpr char kDigits[] = "0123456789abcdef";
-  std::string id;
-  for (const unsigned char byte : random) {
-    id.push_back(kDigits[byte >> 4]);
-    id.push_back(kDigits[byte & 15]);
-  }
-  return id;
-}
+std::string make_request_id() { return random_hex(kRequestIdBytes); }
 
 }  // namespace radbake::api

@@ -25,6 +25,7 @@ struct ClientOptions {
   std::chrono::milliseconds stream_patience{60000};  ///< sum of the delays without news on a transfer or a watch
   std::chrono::milliseconds call_deadline{30000};
   std::chrono::milliseconds plan_deadline{60000};
+  std::string traceparent;  ///< W3C, sent with every call; empty: the server makes one for each
 };
 
 /// A blob that the caller keeps in memory.

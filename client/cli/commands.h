@@ -9,6 +9,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/options.h"
 #include "client/cli/reporter.h"
+#include "common/base/trace.h"
 
 namespace radbake::cli {
 
@@ -17,7 +18,11 @@ struct CommandContext {
   const CommandLine& line;
   Reporter& reporter;
   const Interrupt& interrupt;
+  const TraceContext& trace;  ///< of everything that this command causes
 };
+
+/// The trace that the environment's TRACEPARENT says that we are part of; a new one where it says none that is valid.
+TraceContext trace_of_environment();
 
 ExitCode run_submit(const CommandContext& context);
 /// `radbake plan`, and `radbake submit --dry-run`.

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "client/cli/proto_json.h"
 #include "client/cli/reporter.h"
@@ -11,10 +12,10 @@ using Json = nlohmann::ordered_json;
 
 class JsonReporter final : public Reporter {
  public:
-  explicit JsonReporter(bool is_stream) : is_stream_(is_stream) {}
+  JsonReporter(bool is_stream, std::string trace_id) : is_stream_(is_stream), trace_id_(std::move(trace_id)) {}
 
   void submitted(const v1::Bake& bake) override {
-    event("submitted", {{"bake", to_json(bake)}});
+    event("submitted", {{"trace_id", trace_id_}, {"bake", to_json(bake)}});
     is_submitted_ = true;
     for (const Warning& warning : held_) this->warning(warning);
     held_.clear();
@@ -53,8 +54,10 @@ class JsonReporter final : public Reporter {
 
   void failed(const Error& error, ExitCode exit_code) override {
     std::fprintf(stderr, "radbake: error: %s\n", error.message.c_str());
-    const Json failure = {
-        {"code", error_code_name(error.code)}, {"exit_code", static_cast<int>(exit_code)}, {"message", error.message}};
+    const Json failure = {{"code", error_code_name(error.code)},
+                          {"exit_code", static_cast<int>(exit_code)},
+                          {"message", error.message},
+                          {"trace_id", trace_id_}};
     is_stream_ ? event("failed", {{"error", failure}}) : print({{"error", failure}});
   }
 
@@ -73,12 +76,15 @@ class JsonReporter final : public Reporter {
   }
 
   bool is_stream_;
+  std::string trace_id_;
   bool is_submitted_ = false;
   std::vector<Warning> held_;
 };
 
 }  // namespace
 
-std::unique_ptr<Reporter> make_json_reporter(bool is_stream) { return std::make_unique<JsonReporter>(is_stream); }
+std::unique_ptr<Reporter> make_json_reporter(bool is_stream, const std::string& trace_id) {
+  return std::make_unique<JsonReporter>(is_stream, trace_id);
+}
 
 }  // namespace radbake::cli

@@ -38,7 +38,8 @@ int main(int argc, char** argv) {
   }
   const CommandLine& line = std::get<CommandLine>(parsed);
   const Interrupt interrupt;
+  const radbake::TraceContext trace = trace_of_environment();
   const bool is_stream = (line.command == Command::kSubmit && !line.dry_run) || line.command == Command::kWatch;
-  const auto reporter = line.json ? make_json_reporter(is_stream) : make_text_reporter();
-  return run({line, *reporter, interrupt});
+  const auto reporter = line.json ? make_json_reporter(is_stream, trace.trace_id) : make_text_reporter();
+  return run({line, *reporter, interrupt, trace});
 }

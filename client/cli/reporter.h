@@ -36,7 +36,8 @@ class Reporter {
 std::unique_ptr<Reporter> make_text_reporter();
 
 /// For programs. `is_stream`: one event a line, the first of which is "submitted" or "failed"; else one object in all.
-std::unique_ptr<Reporter> make_json_reporter(bool is_stream);
+/// `trace_id`: told with what was submitted and with what failed.
+std::unique_ptr<Reporter> make_json_reporter(bool is_stream, const std::string& trace_id);
 
 /// A bake's state in words: "form factors".
 std::string stage_name(v1::BakeState state);

@@ -8,8 +8,9 @@
 namespace radbake::cli {
 namespace {
 
-api::ClientOptions client_options(const CommandLine& line) {
+api::ClientOptions client_options(const CommandLine& line, const TraceContext& trace) {
   api::ClientOptions options;
+  options.traceparent = to_traceparent(trace);
   options.plan_deadline = std::chrono::milliseconds(std::llround(1000 * line.plan_seconds));
   return options;
 }
@@ -35,6 +36,17 @@ std::filesystem::path costs_file() {
 
 }  // namespace
 
+TraceContext trace_of_environment() {
+  TraceContext trace = new_trace();
+  const char* outer = std::getenv("TRACEPARENT");
+  // Ours is a step of the trace around us: its id, and a parent of our own.
+  if (const auto given = parse_traceparent(outer == nullptr ? "" : outer)) {
+    trace.trace_id = given->trace_id;
+    trace.is_sampled = given->is_sampled;
+  }
+  return trace;
+}
+
 Result<Session> open_session(const CommandContext& context) {
   std::optional<api::PrivateServer> private_server;
   std::string address = context.line.server;
@@ -44,7 +56,8 @@ Result<Session> open_session(const CommandContext& context) {
     private_server.emplace(std::move(started).value());
     address = private_server->address();
   }
-  Result<api::Client> client = api::Client::connect(address, client_options(context.line), context.interrupt.once());
+  Result<api::Client> client =
+      api::Client::connect(address, client_options(context.line, context.trace), context.interrupt.once());
   if (!client.ok()) {
     Error error = client.error();
     if (private_server) error.message += private_server->log_tail();

@@ -117,7 +117,12 @@ ExitCode run_submit(const CommandContext& context) {
     return fail(context, error);
   }
   stages.end_stage("bake");
-  if (bake->state() != v1::SUCCEEDED) return fail(context, error_of(*bake), exit_code_of(*bake));
+  if (bake->state() != v1::SUCCEEDED) {
+    Error error = error_of(*bake);
+    // By it the server's log tells which lines are about this bake.
+    if (bake->state() == v1::FAILED) error.message += " [trace " + context.trace.trace_id + "]";
+    return fail(context, error, exit_code_of(*bake));
+  }
 
   const bool is_reached = tell_error(context, bake->result().report());
   const std::optional<SceneReport> report = std::move(read->report);

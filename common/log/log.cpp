@@ -4,12 +4,23 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 namespace radbake {
 namespace {
+
+thread_local std::string thread_trace;
+std::string program_trace;
+
+/// Control characters as spaces: what a client wrote must not look like a line of ours.
+std::string in_one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char letter) { return letter < 0x20 || letter == 0x7f; }, ' ');
+  return text;
+}
 
 /// Formats a line as text or as a JSON object. spdlog's own patterns do not escape the message.
 class LineFormatter : public spdlog::formatter {
@@ -29,13 +40,16 @@ class LineFormatter : public spdlog::formatter {
     const auto level_view = spdlog::level::to_string_view(line.level);
     const std::string level(level_view.data(), level_view.size());
     const std::string message(line.payload.data(), line.payload.size());
+    const std::string& trace = thread_trace.empty() ? program_trace : thread_trace;
     std::string text;
     if (is_json_) {
-      const nlohmann::ordered_json object = {
-          {"time", time}, {"level", level}, {"program", program_}, {"pid", getpid()}, {"message", message}};
+      nlohmann::ordered_json object = {{"time", time}, {"level", level}, {"program", program_}, {"pid", getpid()}};
+      if (!trace.empty()) object["trace_id"] = trace;
+      object["message"] = message;
       text = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
     } else {
-      text = fmt::format("{} {} {}: {}\n", time, level, program_, message);
+      text = fmt::format("{} {} {}: {}{}\n", time, level, program_, in_one_line(message),
+                         trace.empty() ? "" : " [trace " + trace + "]");
     }
     out.append(text.data(), text.data() + text.size());
   }
@@ -68,5 +82,13 @@ Result<void> set_up_log(const LogOptions& options) {
   }
   return {};
 }
+
+LogTrace::LogTrace(const std::string& trace_id) : outer_(thread_trace) {
+  if (!trace_id.empty()) thread_trace = trace_id;
+}
+
+LogTrace::~LogTrace() { thread_trace = std::move(outer_); }
+
+void set_program_trace(const std::string& trace_id) { program_trace = trace_id; }
 
 }  // namespace radbake

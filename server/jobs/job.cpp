@@ -21,6 +21,11 @@ std::vector<store::JobEvent> Job::events_after(std::uint64_t sequence) const {
   return events;
 }
 
+std::int64_t Job::entered_unix_ms() const {
+  const std::lock_guard lock(mutex_);
+  return events_.empty() ? 0 : events_.back().unix_ms;
+}
+
 Job::LatestProgress Job::progress() const {
   const std::lock_guard lock(mutex_);
   return progress_;

@@ -22,6 +22,8 @@ class Job {
 
   store::JobRecord record() const;
   std::vector<store::JobEvent> events_after(std::uint64_t sequence) const;
+  /// When it came into its present state; 0 for a job without events.
+  std::int64_t entered_unix_ms() const;
 
   /// The latest progress of this attempt, and a number that grows with each: a slow watcher skips some.
   struct LatestProgress {

@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "common/log/log.h"
+
 namespace radbake::jobs {
 
 using store::JobRecord;
@@ -33,7 +35,14 @@ Result<void> JobQueue::start(WorkerGate& gate) {
   gate_ = &gate;
   raise_open_file_limit();
   watchdog_ = std::jthread([this](std::stop_token stop) { watch_limits(stop); });
-  return thread_.run([this] { return recover(); });
+  RADBAKE_RETURN_IF_ERROR(thread_.run([this] { return recover(); }));
+  has_recovered_ = true;
+  return {};
+}
+
+Result<void> JobQueue::check_recovered() const {
+  if (has_recovered_) return {};
+  return Error{ErrorCode::kUnavailable, "the server is starting and takes up its bakes: try again"};
 }
 
 Result<void> JobQueue::recover() {
@@ -73,7 +82,7 @@ Result<void> JobQueue::recover() {
 
 void JobQueue::make_worker_ready() {
   // Not beside work, which it would take time from.
-  if (!options_.keeps_worker_ready || ready_ || is_draining_ || !runs_.empty()) return;
+  if (!options_.keeps_worker_ready || ready_ || is_refusing_ || is_draining_ || !runs_.empty()) return;
   auto worker = ReadyWorker::start(options_.worker);
   if (worker.ok()) {
     ready_ = std::move(worker).value();
@@ -84,6 +93,7 @@ void JobQueue::make_worker_ready() {
 
 Result<std::shared_ptr<Job>> JobQueue::find_request(const std::string& tenant, const std::string& request_id,
                                                     const std::string& body_sha256) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
   RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> record, store_.find_request(tenant, request_id, body_sha256));
   if (!record) return std::shared_ptr<Job>();
   return find(record->name);
@@ -98,7 +108,10 @@ Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) 
   RADBAKE_ASSIGN_OR_RETURN(const std::shared_ptr<Job> known,
                            find_request(owner.tenant, new_job.request_id, new_job.body_sha256));
   if (known) return known;
-  if (is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: submit again later"};
+  if (is_refusing_ || is_draining_) {
+    return Error{ErrorCode::kUnavailable, "the server is stopping: submit again later"};
+  }
+  const LogTrace trace(owner.trace_id);
 
   // Baked before, or being baked?
   std::shared_ptr<Job> leader;
@@ -106,10 +119,12 @@ Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) 
     RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> stored, find_result(owner, new_job.bake_key));
     if (stored) {
       RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job, &*stored));
+      if (options_.observer != nullptr) options_.observer->cache_looked_up(true);
       spdlog::info("{} answered from the store: '{}', the result of {}", record.name, record.label, stored->name);
       return find(record.name);
     }
     leader = find_leader(owner, new_job.bake_key);
+    if (options_.observer != nullptr) options_.observer->cache_looked_up(leader != nullptr);
   }
   if (const std::size_t num_waiting = waiting_.size() + leaders_.size(); num_waiting >= options_.max_queued) {
     return Error{
@@ -156,6 +171,7 @@ std::shared_ptr<WorkerRun> JobQueue::find_run(const std::string& name) const {
 }
 
 Result<std::shared_ptr<Job>> JobQueue::find(const std::string& name) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
   if (auto live = find_live(name)) return live;
   // It has ended, or never was: a view of what is stored.
   RADBAKE_ASSIGN_OR_RETURN(JobRecord record, store_.get(name));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -17,6 +18,7 @@
 
 #include "common/base/result.h"
 #include "server/jobs/job.h"
+#include "server/jobs/job_observer.h"
 #include "server/jobs/ready_worker.h"
 #include "server/jobs/waiting_line.h"
 #include "server/jobs/worker_link.h"
@@ -39,6 +41,7 @@ struct QueueOptions {
   std::chrono::milliseconds plan_limit{60'000};
   std::chrono::milliseconds check_interval{100};  ///< how often workers are held against their limits
   std::chrono::milliseconds disk_retry{1000};     ///< how often a disk that refused is tried again
+  JobObserver* observer = nullptr;                ///< may be null; outlives the queue
 };
 
 /// Where a job that waits stands.
@@ -46,6 +49,13 @@ struct QueuePlace {
   std::uint32_t position = 0;               ///< 1: next; 0: it does not wait
   std::int64_t expected_start_unix_ms = 0;  ///< 0: not known
   std::string shares;                       ///< the job that runs for it; empty: none
+};
+
+/// How much there is to do.
+struct QueueStats {
+  std::uint64_t num_waiting = 0;
+  std::uint64_t num_running = 0;
+  std::uint64_t num_plans = 0;  ///< that are being made
 };
 
 /// Accepts jobs, runs them one after the other in workers, and keeps the record of what became of them.
@@ -67,7 +77,8 @@ class JobQueue {
   /// Drains.
   ~JobQueue();
 
-  /// Takes up what an earlier server left, and begins to run jobs.
+  /// Takes up what an earlier server left, and begins to run jobs. Until it returns, what asks for jobs or plans is
+  /// answered with kUnavailable.
   Result<void> start(WorkerGate& gate);
 
   /// The job that a request created before; null if none did. Errors: kAlreadyExists for another body.
@@ -94,11 +105,19 @@ class JobQueue {
   /// Runs a worker that only plans. `on_done` is called once, from any thread, with the bytes of the plan.
   /// Returns a name for cancel_plan(). Errors: kResourceExhausted, kUnavailable; then on_done is never called.
   using PlanDone = std::function<void(Result<std::string>)>;
-  Result<std::string> start_plan(const std::string& tenant, const store::Work& work, PlanDone on_done);
+  Result<std::string> start_plan(const store::JobOwner& owner, const store::Work& work, PlanDone on_done);
   void cancel_plan(const std::string& name);
 
   /// Finds the run that a worker belongs to. Errors: kFailedPrecondition if there is none.
   Result<std::shared_ptr<WorkerRun>> greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link);
+
+  QueueStats stats() const;
+
+  /// From now on refuses jobs and plans and starts none that wait; what runs goes on.
+  void refuse_new();
+  /// After refuse_new(): waits for the bakes whose workers say that they will be done before the grace is over. Returns
+  /// when no such bake is left; drain() ends the others.
+  void let_finish(std::chrono::milliseconds grace);
 
   /// Stops for good: refuses new jobs, kills workers and queues their jobs again, lets watchers go. Returns when no
   /// worker is left.
@@ -127,10 +146,11 @@ class JobQueue {
   Result<std::shared_ptr<TileSpool>> begin_attempt(const std::shared_ptr<Job>& job, const store::JobRecord& record);
   /// What every run tells at its end.
   RunEvents ends_of(const std::string& name);
-  Result<std::string> start_plan_run(const std::string& tenant, const store::Work& work, PlanDone on_done);
+  Result<std::string> start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done);
   void advance(const std::string& name, store::JobState state);
   void end_work(const std::string& name, WorkOutcome outcome);
   void end_run(const std::string& name, const WorkerExit& exit);
+  AttemptEnd attempt_end_of(const WorkerRun& run) const;
   void end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run, const std::string& reason);
   void queue_again(const std::shared_ptr<Job>& job, const std::string& why, bool has_failed);
   void finish_plan(const std::string& name, Result<std::string> plan);
@@ -156,6 +176,8 @@ class JobQueue {
   /// The first of its followers runs by itself, for the others, too.
   void hand_over_followers(const std::shared_ptr<Job>& leader);
 
+  Result<void> check_recovered() const;
+  bool will_finish_before(WorkerRun::Clock::time_point limit) const;  // under mutex_: whether a bake will
   std::shared_ptr<Job> find_live(const std::string& name) const;
   std::shared_ptr<WorkerRun> find_run(const std::string& name) const;
   void add_run(const std::shared_ptr<WorkerRun>& run);
@@ -165,6 +187,7 @@ class JobQueue {
   store::JobStore& store_;
   store::TenantContent& content_;
   WorkerGate* gate_ = nullptr;
+  std::atomic<bool> has_recovered_ = false;
 
   // Changed on thread_ alone, under the mutex; other threads read under it.
   mutable std::mutex mutex_;
@@ -172,6 +195,7 @@ class JobQueue {
   std::map<std::string, std::shared_ptr<Job>> live_;        // every job that has not ended
   std::map<std::string, std::shared_ptr<WorkerRun>> runs_;  // of jobs and plans
   bool is_draining_ = false;
+  bool is_refusing_ = false;  // from refuse_new() on
   std::string disk_problem_;
   WorkerRun::Clock::time_point disk_tried_at_;
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/log/log.h"
 #include "server/jobs/job_queue.h"
 #include "server/store/failpoint.h"
 
@@ -20,7 +21,8 @@ void JobQueue::line_up(const std::shared_ptr<Job>& job) {
 }
 
 void JobQueue::run_waiting_jobs() {
-  while (!is_draining_ && disk_problem_.empty() && !waiting_.is_empty() && num_running_ < options_.max_running) {
+  while (!is_refusing_ && !is_draining_ && disk_problem_.empty() && !waiting_.is_empty() &&
+         num_running_ < options_.max_running) {
     const std::string name = waiting_.pop(usual_seconds_).name;
     charged_[name] = usual_seconds_;
     if (const auto job = find_live(name)) start_job(job);
@@ -84,8 +86,11 @@ void JobQueue::start_job(const std::shared_ptr<Job>& job) {
     pause_for_disk(content.error());
     return queue_again(job, content.error().message, false);
   }
-  WorkerRun::Assignment assignment{
-      .job = name, .attempt = record.attempt, .work = record.work, .accepted_unix_ms = record.created_unix_ms};
+  WorkerRun::Assignment assignment{.job = name,
+                                   .attempt = record.attempt,
+                                   .work = record.work,
+                                   .accepted_unix_ms = record.created_unix_ms,
+                                   .trace_id = record.owner.trace_id};
   if (auto checkpoints = store_.checkpoints(record); checkpoints.ok()) {
     assignment.checkpoints = std::move(checkpoints).value();
     std::erase_if(assignment.checkpoints, [&](const auto& left) { return !(*content)->contains(left.digest); });
@@ -128,9 +133,17 @@ void JobQueue::advance(const std::string& name, JobState state) {
 }
 
 Result<void> JobQueue::change_one(const std::shared_ptr<Job>& job, const StateChange& change) {
-  const std::string name = job->record().name;
+  const JobRecord before = job->record();
+  const std::string& name = before.name;
+  const LogTrace trace(before.owner.trace_id);
+  const std::int64_t entered_unix_ms = job->entered_unix_ms();
   RADBAKE_ASSIGN_OR_RETURN(store::RecordedChange recorded, store_.append_event(name, change));
   const JobRecord& record = recorded.record;
+  if (options_.observer != nullptr) {
+    constexpr double kMsPerSecond = 1000;
+    options_.observer->state_changed(before.state, record.state,
+                                     static_cast<double>(recorded.event.unix_ms - entered_unix_ms) / kMsPerSecond);
+  }
   spdlog::info("{} {} (attempt {}): {}", name, job_state_name(record.state), record.attempt,
                record.error ? record.error->message : change.message);
   const bool has_ended = is_terminal(record.state);
@@ -283,12 +296,14 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   const auto run = find_run(name);
   if (!run) return;
   const std::string killed_because = run->kill_reason();
+  const LogTrace trace(run->assignment().trace_id);
   const std::string reason =
       "the worker " + (killed_because.empty() ? exit.reason : killed_because + " and was stopped");
   if (run->assignment().is_plan) {
     finish_plan(name, run->is_cancel_requested() ? Error{ErrorCode::kCancelled, "cancelled"} : internal_error(reason));
   } else {
     --num_running_;
+    if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
     const double seconds = run->seconds();
     if (const auto charged = charged_.extract(name)) {
       const JobRecord record = find(name).ok() ? (*find(name))->record() : JobRecord{};
@@ -325,24 +340,26 @@ void JobQueue::end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run
   queue_again(job, reason + "; it goes on in another attempt", true);
 }
 
-Result<std::string> JobQueue::start_plan(const std::string& tenant, const store::Work& work, PlanDone on_done) {
-  return thread_.run([&] { return start_plan_run(tenant, work, std::move(on_done)); });
+Result<std::string> JobQueue::start_plan(const store::JobOwner& owner, const store::Work& work, PlanDone on_done) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
+  return thread_.run([&] { return start_plan_run(owner, work, std::move(on_done)); });
 }
 
-Result<std::string> JobQueue::start_plan_run(const std::string& tenant, const store::Work& work, PlanDone on_done) {
-  if (is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
+Result<std::string> JobQueue::start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done) {
+  if (is_refusing_ || is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
   if (plans_.size() >= options_.max_running_plans) {
     return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
                                                     " plans are being made, max_running_plans is " +
                                                     std::to_string(options_.max_running_plans)};
   }
-  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(tenant));
+  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(owner.tenant));
   const std::string name = "plans/" + std::to_string(next_plan_++);
   RunEvents events = ends_of(name);
   events.on_progress = [](const JobProgress&) {};
   events.on_tile = [](const std::string&) {};
   const auto run = std::make_shared<WorkerRun>(
-      WorkerRun::Assignment{.job = name, .is_plan = true, .work = work, .time_limit = options_.plan_limit},
+      WorkerRun::Assignment{
+          .job = name, .is_plan = true, .work = work, .time_limit = options_.plan_limit, .trace_id = owner.trace_id},
       options_.worker, *content, std::move(events));
   add_run(run);
   if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {

@@ -40,6 +40,7 @@ struct WorkOrder {
   std::vector<InputFile> inputs;
   std::vector<CheckpointFile> checkpoints;
   double waited_seconds = 0;  ///< since the job was accepted
+  std::string trace_id;       ///< of the call that asked for it
 };
 
 /// Part of a result blob. Parts follow each other without a gap.

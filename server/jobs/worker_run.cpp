@@ -36,7 +36,7 @@ Result<void> WorkerRun::start(WorkerGate& gate, std::unique_ptr<ReadyWorker> rea
   // Open every input now: from here on the worker needs no file system.
   std::vector<store::FileDescriptor> files;
   handover::Assignment handed{assignment_.job, assignment_.attempt, {}};
-  WorkOrder order{assignment_.is_plan, assignment_.work, {}, {}, 0};
+  WorkOrder order{assignment_.is_plan, assignment_.work, {}, {}, 0, assignment_.trace_id};
   for (const Digest& digest : assignment_.work.inputs) {
     RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(digest));
     order.inputs.push_back({digest, file.get()});

@@ -10,6 +10,9 @@
 
 #include <chrono>
 #include <utility>
+#include <vector>
+
+#include "server/service/rpc_watch.h"
 
 namespace radbake::service {
 namespace {
@@ -46,38 +49,76 @@ void set_health(grpc::Server& server, bool is_serving) {
 Result<std::unique_ptr<BakeServer>> BakeServer::start(BakeServerOptions options) {
   options.queue.max_running = static_cast<std::uint32_t>(options.limits.max_running_bakes);
   options.queue.max_queued = static_cast<std::uint32_t>(options.limits.max_queued_bakes);
+  options.queue.max_running_plans = static_cast<std::uint32_t>(options.limits.max_running_plans);
   options.queue.spool_folder = options.data / "spool";
-  std::unique_ptr<BakeServer> server(new BakeServer());
-  RADBAKE_RETURN_IF_ERROR(server->open_stores(options));
-
-  server->queue_ = std::make_unique<jobs::JobQueue>(options.queue, *server->jobs_, *server->content_);
-  server->pool_ = std::make_unique<store::TaskPool>(kPoolThreads);
-  server->costs_ = std::make_unique<CostFile>(options.costs.empty() ? options.data / "costs.txt" : options.costs);
-  server->workers_service_ =
-      std::make_unique<WorkersService>(*server->queue_, *server->pool_, *server->costs_, options.limits);
-  server->content_service_ = std::make_unique<ContentService>(*server->content_, *server->pool_, options.limits);
-  server->bakes_service_ = std::make_unique<BakesService>(*server->queue_, *server->content_, *server->pool_,
-                                                          options.limits, options.max_threads);
-  server->server_service_ = std::make_unique<ServerService>(options.limits);
-
-  // Listen last: who can connect finds everything ready. Jobs of an earlier server begin to run before that.
-  RADBAKE_RETURN_IF_ERROR(server->workers_service_->start());
-  RADBAKE_RETURN_IF_ERROR(server->queue_->start(*server->workers_service_));
-  RADBAKE_RETURN_IF_ERROR(server->listen(options));
+  options.disk.folder = options.data;
+  options.disk.min_free_bytes = options.limits.min_free_disk_bytes;
+  std::unique_ptr<BakeServer> server(new BakeServer(std::move(options)));
+  RADBAKE_RETURN_IF_ERROR(server->run());
   return server;
 }
 
-Result<void> BakeServer::open_stores(const BakeServerOptions& options) {
-  RADBAKE_ASSIGN_OR_RETURN(lock_, lock_folder(options.data));
-  RADBAKE_ASSIGN_OR_RETURN(
-      content_, store::TenantContent::open(options.data / "content",
-                                           {options.limits.max_blob_bytes, options.limits.max_content_bytes}));
-  RADBAKE_ASSIGN_OR_RETURN(jobs_, store::JobStore::open(options.data / "jobs.sqlite"));
-  housekeeping_ = std::make_unique<jobs::Housekeeping>(options.housekeeping, *jobs_, *content_);
+Result<void> BakeServer::run() {
+  RADBAKE_ASSIGN_OR_RETURN(lock_, lock_folder(options_.data));
+  RADBAKE_RETURN_IF_ERROR(start_admin());
+  RADBAKE_RETURN_IF_ERROR(open_stores());
+  make_services();
+  RADBAKE_RETURN_IF_ERROR(workers_service_->start());
+  // Listen before jobs of an earlier server are taken up: an address in use must not cost them an attempt, and who asks
+  // meanwhile is told to come again. Health says NOT_SERVING until then.
+  RADBAKE_RETURN_IF_ERROR(listen());
+  RADBAKE_RETURN_IF_ERROR(queue_->start(*workers_service_));
+  readiness_.clear(Obstacle::kRecovering);
   return {};
 }
 
-Result<void> BakeServer::listen(const BakeServerOptions& options) {
+Result<void> BakeServer::start_admin() {
+  if (options_.admin_listen.empty()) return {};
+  AdminPages pages{[this] { return metrics_page(); }, [this] { return readiness_.why_not(); }};
+  RADBAKE_ASSIGN_OR_RETURN(admin_, AdminServer::start(options_.admin_listen, std::move(pages)));
+  spdlog::info("the admin port is {}", admin_->address());
+  return {};
+}
+
+Result<void> BakeServer::open_stores() {
+  RADBAKE_ASSIGN_OR_RETURN(
+      content_, store::TenantContent::open(options_.data / "content",
+                                           {options_.limits.max_blob_bytes, options_.limits.max_content_bytes}));
+  RADBAKE_ASSIGN_OR_RETURN(jobs_, store::JobStore::open(options_.data / "jobs.sqlite"));
+  housekeeping_ = std::make_unique<jobs::Housekeeping>(options_.housekeeping, *jobs_, *content_);
+  return {};
+}
+
+void BakeServer::make_services() {
+  const Limits& limits = options_.limits;
+  jobs::QueueOptions queue_options = options_.queue;
+  queue_options.observer = &metrics_;
+  queue_ = std::make_unique<jobs::JobQueue>(std::move(queue_options), *jobs_, *content_);
+  pool_ = std::make_unique<store::TaskPool>(kPoolThreads);
+  costs_ = std::make_unique<CostFile>(options_.costs.empty() ? options_.data / "costs.txt" : options_.costs);
+  disk_ = std::make_unique<DiskWatch>(options_.disk, readiness_);
+  workers_service_ = std::make_unique<WorkersService>(*queue_, *pool_, *costs_, metrics_, limits);
+  content_service_ = std::make_unique<ContentService>(*content_, *pool_, *disk_, limits);
+  bakes_service_ = std::make_unique<BakesService>(*queue_, *content_, *pool_, *disk_, limits, options_.max_threads);
+  server_service_ = std::make_unique<ServerService>(limits);
+  has_parts_ = true;
+}
+
+std::string BakeServer::metrics_page() {
+  MetricsSnapshot snapshot;
+  snapshot.max_queued_bakes = options_.limits.max_queued_bakes;
+  snapshot.max_running_bakes = options_.limits.max_running_bakes;
+  snapshot.min_free_disk_bytes = options_.limits.min_free_disk_bytes;
+  if (has_parts_) {
+    snapshot.queue = queue_->stats();
+    snapshot.upload_bytes = content_->upload_bytes();
+    snapshot.content_bytes = disk_->content_bytes();
+    snapshot.free_disk_bytes = disk_->free_bytes();
+  }
+  return metrics_.render(snapshot, readiness_);
+}
+
+Result<void> BakeServer::listen() {
   // Never paid back: when the last gRPC object goes, the library stops its threads, and one that polls for a socket's
   // writes may be waited for as long as 10 s.
   grpc_init();
@@ -85,11 +126,11 @@ Result<void> BakeServer::listen(const BakeServerOptions& options) {
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(options_.listen, grpc::InsecureServerCredentials(), &port);
   builder.RegisterService(content_service_.get());
   builder.RegisterService(bakes_service_.get());
   builder.RegisterService(server_service_.get());
-  builder.SetMaxReceiveMessageSize(static_cast<int>(options.limits.max_message_bytes));
+  builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.max_message_bytes));
   builder.SetMaxSendMessageSize(kMaxSendBytes);
   builder.SetResourceQuota(grpc::ResourceQuota("radbaked").Resize(kTransportQuotaBytes));
   // Reflection is the one service with a blocking implementation: two threads are enough for it.
@@ -102,31 +143,38 @@ Result<void> BakeServer::listen(const BakeServerOptions& options) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+  interceptors.push_back(std::make_unique<RpcWatch>(metrics_));
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
   server_ = builder.BuildAndStart();
   if (!server_ || port == 0) {
-    return Error{ErrorCode::kUnavailable, "cannot listen on '" + options.listen +
+    return Error{ErrorCode::kUnavailable, "cannot listen on '" + options_.listen +
                                               "': not an address of this machine (host:port or unix:PATH), or in use"};
   }
-  address_ = options.listen;
-  if (!options.listen.starts_with("unix:")) {
-    address_ = options.listen.substr(0, options.listen.rfind(':')) + ":" + std::to_string(port);
+  address_ = options_.listen;
+  if (!options_.listen.starts_with("unix:")) {
+    address_ = options_.listen.substr(0, options_.listen.rfind(':')) + ":" + std::to_string(port);
   }
-  set_health(*server_, true);
+  readiness_.listen([this](bool is_ready) { set_health(*server_, is_ready); });
   return {};
 }
 
 BakeServer::~BakeServer() {
   stop();
+  admin_.reset();
   // A start that failed half-way may have workers already.
   if (queue_) queue_->drain();
   if (workers_service_) workers_service_->stop();
+  readiness_.listen(nullptr);
   // No call is left; the pool's last tasks still use the queue.
   pool_.reset();
 }
 
 void BakeServer::stop() {
   if (!server_) return;
-  set_health(*server_, false);
+  queue_->refuse_new();
+  readiness_.set(Obstacle::kDraining, "the server is stopping");
+  queue_->let_finish(options_.drain_grace);
   queue_->drain();
   server_->Shutdown(std::chrono::system_clock::now() + kShutdownGrace);
   workers_service_->stop();

@@ -2,16 +2,23 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "common/base/limits.h"
 #include "common/base/result.h"
 #include "server/jobs/housekeeping.h"
 #include "server/jobs/job_queue.h"
+#include "server/service/admin_server.h"
 #include "server/service/bakes_service.h"
 #include "server/service/content_service.h"
+#include "server/service/disk_watch.h"
+#include "server/service/metrics.h"
+#include "server/service/readiness.h"
 #include "server/service/server_service.h"
 #include "server/service/workers_service.h"
 #include "server/store/job_store.h"
@@ -27,10 +34,16 @@ struct BakeServerOptions {
   jobs::HousekeepingOptions housekeeping;
   jobs::QueueOptions queue;  ///< its max_* and spool folder are set from here
   Limits limits;
-  std::uint32_t max_threads = 0;  ///< of a bake; 0: no bound
+  std::uint32_t max_threads = 0;             ///< of a bake; 0: no bound
+  std::string admin_listen;                  ///< host:port (0: any) for /metrics, /livez and /readyz; empty: none
+  std::chrono::milliseconds drain_grace{0};  ///< bakes that will be done by then may end when the server stops
+  DiskWatchOptions disk;                     ///< its folder and floor are set from here
 };
 
 /// The whole server: stores, queue and services, listening. start() ... stop(), once.
+///
+/// What outside can see of it, in order: /livez; the address, with health NOT_SERVING and bakes UNAVAILABLE while it
+/// takes up what an earlier server left; SERVING, unless the disk is full; NOT_SERVING from stop() on.
 class BakeServer {
  public:
   /// Errors: kFailedPrecondition for a data folder in use, kUnavailable for an address that cannot be listened on.
@@ -40,14 +53,25 @@ class BakeServer {
 
   /// Where clients find it, with the port that was chosen.
   const std::string& address() const { return address_; }
+  /// Where the admin port is; empty: there is none.
+  std::string admin_address() const { return admin_ ? admin_->address() : ""; }
 
-  /// Refuses new work, queues running bakes for the next start, ends watches, and waits for calls to end.
+  /// Refuses new work, lets bakes end that will be done within the grace, queues the others for the next start, ends
+  /// watches, and waits for calls to end.
   void stop();
 
  private:
-  BakeServer() = default;
-  Result<void> open_stores(const BakeServerOptions& options);
-  Result<void> listen(const BakeServerOptions& options);
+  explicit BakeServer(BakeServerOptions options) : options_(std::move(options)) {}
+  Result<void> run();
+  Result<void> start_admin();
+  Result<void> open_stores();
+  void make_services();
+  Result<void> listen();
+  std::string metrics_page();
+
+  const BakeServerOptions options_;
+  Metrics metrics_;
+  Readiness readiness_;
 
   store::FileDescriptor lock_;
   std::unique_ptr<store::TenantContent> content_;
@@ -60,8 +84,11 @@ class BakeServer {
   std::unique_ptr<ContentService> content_service_;
   std::unique_ptr<BakesService> bakes_service_;
   std::unique_ptr<ServerService> server_service_;
+  std::unique_ptr<DiskWatch> disk_;
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
+  std::atomic<bool> has_parts_ = false;  // what metrics_page() reads is there
+  std::unique_ptr<AdminServer> admin_;   // last: its pages read the others
 };
 
 }  // namespace radbake::service

@@ -5,6 +5,7 @@
 
 #include "server/service/convert.h"
 #include "server/service/plan_reactor.h"
+#include "server/service/rpc_watch.h"
 #include "server/service/scene_check.h"
 #include "server/service/status.h"
 #include "server/service/watch_reactor.h"
@@ -31,6 +32,10 @@ std::string client_of(const grpc::CallbackServerContext& context) {
   const auto found = metadata.find("radbake-client");
   if (found == metadata.end()) return context.peer();
   return {found->second.data(), std::min(found->second.size(), kMaxClientBytes)};
+}
+
+store::JobOwner owner_of(const grpc::CallbackServerContext& context) {
+  return {.client = client_of(context), .trace_id = trace_id_of(context)};
 }
 
 void set_place(const jobs::QueuePlace& place, v1::Bake& bake) {
@@ -61,7 +66,7 @@ grpc::Status BakesService::submit(const grpc::CallbackServerContext& context, co
                                   v1::Bake& bake) {
   store::NewJob job;
   std::shared_ptr<jobs::Job> known;
-  job.owner.client = client_of(context);
+  job.owner = owner_of(context);
   if (auto status = admit(request, job, known); !status.ok()) return status;
   return known ? reply(known, bake) : reply(queue_.submit(job), bake);
 }
@@ -72,6 +77,7 @@ grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* co
   pool_.post([this, context, &request, &bake, reactor] {
     store::NewJob job;
     std::shared_ptr<jobs::Job> known;
+    job.owner = owner_of(*context);
     grpc::Status status = check_protocol(*context);
     if (status.ok()) status = admit(request, job, known);
     if (status.ok()) {
@@ -80,7 +86,7 @@ grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* co
       *bake.mutable_manifest() = request.manifest();
       *bake.mutable_settings() = request.settings();
     }
-    reactor->begin(status, job.owner.tenant, job.work);
+    reactor->begin(status, job.owner, job.work);
   });
   return reactor;
 }
@@ -107,6 +113,9 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
   if (!found.ok()) return to_status(found.error());
   known = *found;
   if (known) return grpc::Status::OK;
+  if (auto room = disk_.admit(); !room.ok() && !request.validate_only()) {
+    return to_status(room.error(), "min_free_disk_bytes");
+  }
 
   const auto content = content_.of(job.owner.tenant);
   if (!content.ok()) return to_status(content.error());
@@ -126,14 +135,14 @@ grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* co
   pool_.post([this, context, request, reactor] {
     store::Work work;
     grpc::Status status = check_protocol(*context);
-    const std::string tenant;
-    const auto content = content_.of(tenant);
+    const store::JobOwner owner = owner_of(*context);
+    const auto content = content_.of(owner.tenant);
     if (status.ok() && !content.ok()) status = to_status(content.error());
     if (status.ok()) {
       status = check_scene({request->manifest(), request->settings(), request->run()}, limits_, max_threads_, **content,
                            work);
     }
-    reactor->begin(status, tenant, work);
+    reactor->begin(status, owner, work);
   });
   return reactor;
 }

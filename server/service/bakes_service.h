@@ -3,6 +3,7 @@
 #include "common/base/limits.h"
 #include "radbake/v1/bake.grpc.pb.h"
 #include "server/jobs/job_queue.h"
+#include "server/service/disk_watch.h"
 #include "server/store/task_pool.h"
 #include "server/store/tenant_content.h"
 
@@ -12,9 +13,9 @@ namespace radbake::service {
 class BakesService : public v1::Bakes::CallbackService {
  public:
   /// max_threads: of a bake; 0: as many as it asks for.
-  BakesService(jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool, const Limits& limits,
-               std::uint32_t max_threads)
-      : queue_(queue), content_(content), pool_(pool), limits_(limits), max_threads_(max_threads) {}
+  BakesService(jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool, const DiskWatch& disk,
+               const Limits& limits, std::uint32_t max_threads)
+      : queue_(queue), content_(content), pool_(pool), disk_(disk), limits_(limits), max_threads_(max_threads) {}
 
   grpc::ServerUnaryReactor* SubmitBake(grpc::CallbackServerContext* context, const v1::SubmitBakeRequest* request,
                                        v1::Bake* bake) override;
@@ -47,6 +48,7 @@ class BakesService : public v1::Bakes::CallbackService {
   jobs::JobQueue& queue_;
   store::TenantContent& content_;
   store::TaskPool& pool_;
+  const DiskWatch& disk_;
   const Limits limits_;
   const std::uint32_t max_threads_;
 };

@@ -34,7 +34,7 @@ grpc::ServerUnaryReactor* ContentService::FindMissing(grpc::CallbackServerContex
 
 grpc::ServerReadReactor<v1::UploadChunk>* ContentService::Upload(grpc::CallbackServerContext* context,
                                                                  v1::UploadResult* result) {
-  return new UploadReactor(check_protocol(*context), *content_.of("").value(), pool_, limits_, result);
+  return new UploadReactor(check_protocol(*context), *content_.of("").value(), pool_, disk_, limits_, result);
 }
 
 grpc::ServerUnaryReactor* ContentService::QueryUpload(grpc::CallbackServerContext* context,

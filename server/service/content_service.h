@@ -2,6 +2,7 @@
 
 #include "common/base/limits.h"
 #include "radbake/v1/content.grpc.pb.h"
+#include "server/service/disk_watch.h"
 #include "server/store/task_pool.h"
 #include "server/store/tenant_content.h"
 
@@ -10,8 +11,8 @@ namespace radbake::service {
 /// radbake.v1.Content over the content store. Everything that touches the disk runs on the pool.
 class ContentService : public v1::Content::CallbackService {
  public:
-  ContentService(store::TenantContent& content, store::TaskPool& pool, const Limits& limits)
-      : content_(content), pool_(pool), limits_(limits) {}
+  ContentService(store::TenantContent& content, store::TaskPool& pool, const DiskWatch& disk, const Limits& limits)
+      : content_(content), pool_(pool), disk_(disk), limits_(limits) {}
 
   grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context, const v1::FindMissingRequest* request,
                                         v1::FindMissingResponse* response) override;
@@ -25,6 +26,7 @@ class ContentService : public v1::Content::CallbackService {
  private:
   store::TenantContent& content_;
   store::TaskPool& pool_;
+  const DiskWatch& disk_;
   const Limits limits_;
 };
 

@@ -1,19 +1,20 @@
-// radbaked: the baking server. Reads its options, starts a BakeServer and waits for a signal to stop it.
+// radbaked: the baking server. Reads its configuration, starts a BakeServer and waits for a signal to stop it.
 
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
-#include <cstdio>
-#include <cstdlib>
 #include <iostream>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "server/service/bake_server.h"
+#include "server/service/notify.h"
+#include "server/service/server_config.h"
 
 namespace radbake::service {
 namespace {
@@ -21,67 +22,6 @@ namespace {
 constexpr int kExitUsage = 2;
 constexpr int kExitCannotStart = 4;
 constexpr int kExitSecondSignal = 130;
-
-struct ProgramOptions {
-  BakeServerOptions server;
-  LogOptions log{"radbaked", "info", false};
-  bool is_bound_to_parent = false;
-};
-
-std::filesystem::path default_data_folder() {
-  if (const char* data = std::getenv("XDG_DATA_HOME"); data && *data) return std::filesystem::path(data) / "radbake";
-  if (const char* home = std::getenv("HOME"); home && *home) {
-    return std::filesystem::path(home) / ".local" / "share" / "radbake";
-  }
-  return "radbake-data";
-}
-
-std::filesystem::path default_worker() {
-  std::error_code ignored;
-  return std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path() / "radbake-worker";
-}
-
-void declare_options(CLI::App& app, ProgramOptions& options) {
-  BakeServerOptions& server = options.server;
-  server.data = default_data_folder();
-  server.queue.worker.program = default_worker();
-  server.queue.keeps_worker_ready = true;
-  app.add_option("--listen", server.listen, "HOST:PORT (port 0: any free one) or unix:PATH")
-      ->capture_default_str()
-      ->type_name("ADDRESS");
-  app.add_option("--data", server.data, "Folder for scenes, bakes and results")
-      ->capture_default_str()
-      ->type_name("DIR");
-  app.add_option("--costs", server.costs,
-                 "File for what bakes cost on this host, behind predictions; default: DIR/costs.txt")
-      ->type_name("FILE");
-  app.add_option("--worker", server.queue.worker.program, "The radbake-worker to run")
-      ->capture_default_str()
-      ->type_name("PATH");
-  app.add_option("--threads", server.max_threads, "Threads of a bake at most; 0: all cores")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  app.add_option("--max-running", server.limits.max_running_bakes, "Bakes at the same time")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  app.add_flag("--log-json", options.log.is_json, "Log JSON lines instead of text");
-  app.add_option("--log-level", options.log.level, "trace, debug, info, warning, error or off")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
-      ->capture_default_str();
-  app.add_flag("--exit-with-parent", options.is_bound_to_parent, "Stop when the process that started this one ends");
-  app.set_config("--config", "", "Read options from a file: one name=value a line")->type_name("FILE");
-  app.set_version_flag("--version", std::string("radbaked ") + kEngineVersion);
-  app.footer(
-      "Examples:\n"
-      "  radbaked                                     on 127.0.0.1:7419\n"
-      "  radbaked --listen 127.0.0.1:0 --data /tmp/r  on a free port, which it prints\n"
-      "  radbaked --listen unix:/run/radbake.sock --max-running 2 --threads 8 --log-json\n"
-      "\n"
-      "Prints 'radbaked VERSION listening on ADDRESS' when it is ready; logs go to stderr. SIGTERM or Ctrl-C stops "
-      "it:\n"
-      "running bakes go back to the queue and run again at the next start. There is no authentication: listen on the\n"
-      "loopback or put a proxy in front.");
-}
 
 /// Waits for SIGTERM or SIGINT, or with --exit-with-parent for the end of the parent.
 void wait_for_stop(const sigset_t& signals, pid_t parent, bool is_bound_to_parent) {
@@ -97,32 +37,32 @@ void wait_for_stop(const sigset_t& signals, pid_t parent, bool is_bound_to_paren
   }
 }
 
-int run(const ProgramOptions& options, const sigset_t& signals, pid_t parent) {
-  if (auto log = set_up_log(options.log); !log.ok()) {
-    std::cerr << "radbaked: " << log.error().message << "\n";
-    return kExitUsage;
-  }
-  BakeServerOptions server_options = options.server;
-  server_options.queue.worker.log_json = options.log.is_json;
-  if (::access(server_options.queue.worker.program.c_str(), X_OK) != 0) {
-    std::cerr << "radbaked: there is no worker program " << server_options.queue.worker.program.string()
-              << ": name it with --worker\n";
-    return kExitCannotStart;
-  }
-  auto server = BakeServer::start(std::move(server_options));
-  if (!server.ok()) {
-    std::cerr << "radbaked: " << server.error().message << "\n";
-    return kExitCannotStart;
-  }
-  std::cout << "radbaked " << kEngineVersion << " listening on " << (*server)->address() << std::endl;
+int fail(const Error& error, int exit_code) {
+  std::cerr << "radbaked: " << error.message << "\n";
+  return exit_code;
+}
 
-  if (!options.is_bound_to_parent || getppid() == parent) wait_for_stop(signals, parent, options.is_bound_to_parent);
+int run(const ServerConfig& config, const sigset_t& signals, pid_t parent) {
+  if (auto log = set_up_log(config.log); !log.ok()) return fail(log.error(), kExitUsage);
+  if (auto host = check_host(config); !host.ok()) return fail(host.error(), kExitCannotStart);
+  BakeServerOptions options = config.server;
+  options.queue.worker.log_json = config.log.is_json;
+  auto server = BakeServer::start(std::move(options));
+  if (!server.ok()) return fail(server.error(), kExitCannotStart);
+  const std::string program = std::string("radbaked ") + kEngineVersion;
+  std::cout << program << " listening on " << (*server)->address() << std::endl;
+  const std::string admin = (*server)->admin_address();
+  if (!admin.empty()) std::cout << program << " admin on " << admin << std::endl;
+  notify_service_manager("READY=1");
+
+  if (!config.is_bound_to_parent || getppid() == parent) wait_for_stop(signals, parent, config.is_bound_to_parent);
   // A second signal does not wait for anything. Workers end by themselves when their socket breaks.
   std::thread([signals] {
     int signal = SIGUSR1;
     while (signal == SIGUSR1) sigwait(&signals, &signal);
     _exit(kExitSecondSignal);
   }).detach();
+  notify_service_manager("STOPPING=1");
   (*server)->stop();
   spdlog::info("stopped");
   return 0;
@@ -141,15 +81,12 @@ int main(int argc, char** argv) {
   signal(SIGPIPE, SIG_IGN);
   const pid_t parent = getppid();
 
-  ProgramOptions options;
-  CLI::App app("The baking server of radbake: stores scenes, bakes them in worker processes, keeps the results.",
-               "radbaked");
-  declare_options(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& problem) {
-    return app.exit(problem) == 0 ? 0 : kExitUsage;
+  const auto parsed = parse_config({argv + 1, argv + argc});
+  if (!parsed.ok()) return fail(parsed.error(), kExitUsage);
+  if (parsed->answer) {
+    std::cout << *parsed->answer << std::flush;
+    return 0;
   }
-  if (options.is_bound_to_parent) prctl(PR_SET_PDEATHSIG, SIGUSR1);
-  return run(options, signals, parent);
+  if (parsed->config.is_bound_to_parent) prctl(PR_SET_PDEATHSIG, SIGUSR1);
+  return run(parsed->config, signals, parent);
 }

@@ -39,9 +39,9 @@ class Link : public jobs::WorkerLink {
 
 }  // namespace
 
-ReportReactor* ReportReactor::start(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs,
+ReportReactor* ReportReactor::start(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, Metrics& metrics,
                                     const Limits& limits) {
-  const std::shared_ptr<ReportReactor> reactor(new ReportReactor(queue, pool, costs, limits));
+  const std::shared_ptr<ReportReactor> reactor(new ReportReactor(queue, pool, costs, metrics, limits));
   reactor->self_ = reactor;
   reactor->StartRead(&reactor->report_);
   return reactor.get();
@@ -84,7 +84,10 @@ grpc::Status ReportReactor::take_report() {
       break;
     }
     case v1::WorkerReport::kBakeFinished: {
-      costs_.add(report_.bake_finished().report().run().costs());
+      const v1::BakeReport& report = report_.bake_finished().report();
+      costs_.add(report.run().costs());
+      metrics_.bake_reported(report.num_row_rays() + report.num_gather_rays() + report.num_light_rays(),
+                             report.run().rays_per_second(), report.run().peak_memory_bytes());
       std::vector<Digest> blobs;
       for (const v1::Layer& layer : report_.bake_finished().layers()) blobs.push_back(from_message(layer.blob()));
       if (report_.bake_finished().has_mesh_data()) blobs.push_back(from_message(report_.bake_finished().mesh_data()));
@@ -114,6 +117,7 @@ v1::WorkerCommand ReportReactor::start_command(const jobs::WorkOrder& order) con
   v1::StartWork& start = *command.mutable_start();
   start.set_plan_only(order.is_plan);
   start.set_waited_seconds(order.waited_seconds);
+  start.set_trace_id(order.trace_id);
   *start.mutable_manifest() = to_message(order.work.manifest);
   start.mutable_settings()->ParseFromString(order.work.settings);
   start.mutable_run()->ParseFromString(order.work.run);

@@ -12,6 +12,7 @@
 #include "server/jobs/job_queue.h"
 #include "server/jobs/worker_link.h"
 #include "server/service/cost_file.h"
+#include "server/service/metrics.h"
 #include "server/store/task_pool.h"
 
 namespace radbake::service {
@@ -22,7 +23,8 @@ namespace radbake::service {
 class ReportReactor : public grpc::ServerBidiReactor<v1::WorkerReport, v1::WorkerCommand>,
                       public std::enable_shared_from_this<ReportReactor> {
  public:
-  static ReportReactor* start(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, const Limits& limits);
+  static ReportReactor* start(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, Metrics& metrics,
+                              const Limits& limits);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -33,8 +35,8 @@ class ReportReactor : public grpc::ServerBidiReactor<v1::WorkerReport, v1::Worke
   v1::WorkerCommand start_command(const jobs::WorkOrder& order) const;
 
  private:
-  ReportReactor(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, const Limits& limits)
-      : queue_(queue), pool_(pool), costs_(costs), limits_(limits) {}
+  ReportReactor(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, Metrics& metrics, const Limits& limits)
+      : queue_(queue), pool_(pool), costs_(costs), metrics_(metrics), limits_(limits) {}
 
   grpc::Status take_report();
   void end(const grpc::Status& status);
@@ -43,6 +45,7 @@ class ReportReactor : public grpc::ServerBidiReactor<v1::WorkerReport, v1::Worke
   jobs::JobQueue& queue_;
   store::TaskPool& pool_;
   CostFile& costs_;
+  Metrics& metrics_;
   const Limits limits_;
   std::shared_ptr<ReportReactor> self_;  // until OnDone
 

@@ -6,8 +6,8 @@
 namespace radbake::service {
 
 UploadReactor::UploadReactor(const grpc::Status& admission, store::ContentStore& content, store::TaskPool& pool,
-                             const Limits& limits, v1::UploadResult* result)
-    : content_(content), pool_(pool), limits_(limits), result_(result) {
+                             const DiskWatch& disk, const Limits& limits, v1::UploadResult* result)
+    : content_(content), pool_(pool), disk_(disk), limits_(limits), result_(result) {
   if (!admission.ok()) {
     Finish(admission);
   } else {
@@ -38,6 +38,7 @@ std::optional<grpc::Status> UploadReactor::take_chunk() {
       return grpc::Status::OK;
     }
   }
+  if (auto room = disk_.admit(); !room.ok()) return to_status(room.error(), "min_free_disk_bytes");
   if (chunk_.data().size() > limits_.chunk_bytes) {
     return above_limit("chunk_bytes", chunk_.data().size(), limits_.chunk_bytes);
   }

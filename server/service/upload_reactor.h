@@ -6,6 +6,7 @@
 
 #include "common/base/limits.h"
 #include "radbake/v1/content.pb.h"
+#include "server/service/disk_watch.h"
 #include "server/store/content_store.h"
 #include "server/store/task_pool.h"
 
@@ -17,7 +18,7 @@ namespace radbake::service {
 class UploadReactor : public grpc::ServerReadReactor<v1::UploadChunk> {
  public:
   UploadReactor(const grpc::Status& admission, store::ContentStore& content, store::TaskPool& pool,
-                const Limits& limits, v1::UploadResult* result);
+                const DiskWatch& disk, const Limits& limits, v1::UploadResult* result);
 
   void OnReadDone(bool ok) override;
   void OnDone() override { delete this; }
@@ -28,6 +29,7 @@ class UploadReactor : public grpc::ServerReadReactor<v1::UploadChunk> {
 
   store::ContentStore& content_;
   store::TaskPool& pool_;
+  const DiskWatch& disk_;
   const Limits limits_;
   v1::UploadResult* const result_;
   v1::UploadChunk chunk_;

@@ -26,7 +26,7 @@ void WorkersService::adopt(store::FileDescriptor socket) {
 }
 
 grpc::ServerBidiReactor<v1::WorkerReport, v1::WorkerCommand>* WorkersService::Report(grpc::CallbackServerContext*) {
-  return ReportReactor::start(queue_, pool_, costs_, limits_);
+  return ReportReactor::start(queue_, pool_, costs_, metrics_, limits_);
 }
 
 }  // namespace radbake::service

@@ -9,6 +9,7 @@
 #include "server/jobs/job_queue.h"
 #include "server/jobs/worker_link.h"
 #include "server/service/cost_file.h"
+#include "server/service/metrics.h"
 #include "server/store/task_pool.h"
 
 namespace radbake::service {
@@ -17,8 +18,8 @@ namespace radbake::service {
 /// can reach it.
 class WorkersService : public v1::Workers::CallbackService, public jobs::WorkerGate {
  public:
-  WorkersService(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, const Limits& limits)
-      : queue_(queue), pool_(pool), costs_(costs), limits_(limits) {}
+  WorkersService(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, Metrics& metrics, const Limits& limits)
+      : queue_(queue), pool_(pool), costs_(costs), metrics_(metrics), limits_(limits) {}
 
   Result<void> start();
   void stop();
@@ -30,6 +31,7 @@ class WorkersService : public v1::Workers::CallbackService, public jobs::WorkerG
   jobs::JobQueue& queue_;
   store::TaskPool& pool_;
   CostFile& costs_;
+  Metrics& metrics_;
   const Limits limits_;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -226,6 +226,18 @@ UploadProgress ContentStore::query_upload(const Digest& digest) const {
   return {static_cast<std::uint64_t>(facts.st_size), false};
 }
 
+std::uint64_t ContentStore::upload_bytes() const {
+  std::unique_lock lock(mutex_);
+  const auto uploads = uploads_;
+  lock.unlock();
+  std::uint64_t total = 0;
+  for (const auto& [digest, upload] : uploads) {
+    const std::lock_guard upload_lock(upload->mutex);
+    if (!upload->is_over && upload->writer) total += upload->writer->size();
+  }
+  return total;
+}
+
 Result<std::unique_ptr<BlobWriter>> ContentStore::new_blob() {
   return BlobWriter::create(folder_ / "temporary" / std::to_string(next_temporary_++));
 }

@@ -62,6 +62,8 @@ class ContentStore {
   /// Committed bytes survive a broken connection and the end of the server; after a power loss some may be wrong, which
   /// shows when the upload is finished.
   UploadProgress query_upload(const Digest& digest) const;
+  /// Received of all uploads that are not complete.
+  std::uint64_t upload_bytes() const;
 
   /// A blob whose digest is known only when its last byte is: a result. max_bytes does not hold for it: it has taken
   /// hours.

@@ -16,6 +16,7 @@
 #include "common/base/limits.h"
 #include "common/base/version.h"
 #include "common/codec/scene_codec.h"
+#include "common/log/log.h"
 #include "server/settings/to_options.h"
 #include "server/worker/input_blobs.h"
 #include "server/worker/report_stream.h"
@@ -211,6 +212,7 @@ int run_worker(const std::shared_ptr<grpc::Channel>& channel, const WorkerIdenti
     return kExitServerGone;
   }
 
+  set_program_trace(start->trace_id());
   auto done = work(*start, identity, stream);
   v1::WorkerReport outcome;
   if (done.ok()) {

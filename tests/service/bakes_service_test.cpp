@@ -44,7 +44,7 @@ class BakesServiceTest : public ::testing::Test {
     options.limits.max_queued_bakes = 2;
     options.limits.max_meshes = 10;
     options.queue.plan_limit = std::chrono::milliseconds(300);
-    options.queue.max_running_plans = 1;
+    options.limits.max_running_plans = 1;
     return options;
   }
 

@@ -661,6 +661,27 @@ class SharedServer(CliTest):
         submit.communicate(timeout=LIMIT_SECONDS)
         self.assertEqual(submit.returncode, 6)
 
+    def test_a_trace_goes_from_the_caller_to_the_servers_log(self):
+        trace = "4bf92f3577b34da6a3ce929d0e0e4736"
+        for i, (header, is_ours) in enumerate(((f"00-{trace}-00f067aa0ba902b7-01", True), ("not one", False))):
+            result = self.run_cli("submit", CORNELL, "-o", self.place / f"out{i}", "--json", *QUICK, TRACEPARENT=header)
+            self.assert_exit(result, 0)
+            submitted = json.loads(result.stdout.splitlines()[0])
+            self.assertRegex(submitted["trace_id"], "^[0-9a-f]{32}$")
+            self.assertEqual(submitted["trace_id"] == trace, is_ours)
+            name = submitted["bake"]["name"]
+            lines = [line for line in (self.place / "log").read_text().splitlines() if name in line]
+            self.assertGreater(len(lines), 3)
+            for line in lines:
+                self.assertTrue(line.endswith(f"[trace {submitted['trace_id']}]"), line)
+
+    def test_a_bake_that_fails_names_its_trace(self):
+        result = self.run_cli("submit", CORNELL, "-o", self.place / "out", "--json", "--effect", "sun=on", *QUICK)
+        self.assert_exit(result, 3)
+        error = json.loads(result.stdout.splitlines()[-1])["error"]
+        self.assertRegex(error["trace_id"], "^[0-9a-f]{32}$")
+        self.assertTrue(error["message"].endswith(f"[trace {error['trace_id']}]"), error)
+
     def test_an_unknown_job_is_a_usage_error(self):
         for arguments in (["watch", "nobody"], ["finish", "nobody"], ["cancel", "nobody"], ["download", "nobody", "-o", self.place / "out"]):
             result = self.run_cli(*arguments)

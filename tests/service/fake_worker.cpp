@@ -74,6 +74,7 @@ class FakeWorker {
       case kCrash: raise(SIGSEGV); return;
       case kExitWithMessage: std::cerr << kLastWords << std::endl; _exit(7);
       case kHang: std::this_thread::sleep_for(1h); return;
+      case kNearlyDone: seconds_left_ = kFakeSecondsLeft; return run(true);
       case kRunUntilCancelled: return run(true);
       case kIgnoreCancel: return run(false);
       case kSendWrongDigest: return send_layer(std::string("not these bytes")), finish_bake();
@@ -123,6 +124,7 @@ class FakeWorker {
     v1::WorkerReport report;
     report.mutable_progress()->set_state(state);
     report.mutable_progress()->set_fraction(fraction);
+    report.mutable_progress()->set_seconds_left(seconds_left_);
     report.mutable_progress()->set_pass(kFakePass);
     report.mutable_progress()->set_relative_error(kFakeError);
     report.mutable_progress()->set_relative_error_low(kFakeErrorLow);
@@ -170,7 +172,9 @@ class FakeWorker {
     layer.set_height(layer_.height);
     layer.set_channels(kFakeChannels);
     set_digest(*layer.mutable_blob());
+    report.mutable_bake_finished()->mutable_report()->set_num_gather_rays(kFakeRays);
     v1::RunReport& run = *report.mutable_bake_finished()->mutable_report()->mutable_run();
+    run.set_rays_per_second(kFakeRaysPerSecond);
     run.mutable_costs()->set_row_ray(kFakeRayCost);
     // Says how long it was told that the bake had waited.
     run.set_wall_seconds(start_.waited_seconds());
@@ -225,6 +229,7 @@ class FakeWorker {
   const unsigned attempt_;
   const std::vector<int> handed_;  // inputs of a worker that was started ahead of need
   v1::StartWork start_;
+  double seconds_left_ = -1;  // not known
   std::atomic<bool> is_cancelled_ = false, is_finishing_ = false;
   std::thread reader_;
 };

@@ -16,6 +16,7 @@ enum FakeWork {
   kListDescriptors = 10,    ///< fails with the list of its open descriptors
   kSucceedSecondTime = 11,  ///< attempt 1 as kRunUntilCancelled, attempt 2 as kSucceed
   kReadInputs = 12,         ///< fails with the sum of the sizes of its inputs, read from their descriptors
+  kNearlyDone = 40,         ///< as kRunUntilCancelled, but says all the time that it is nearly done
 };
 
 // What a worker does before it has its work goes by its program's name.
@@ -33,6 +34,10 @@ inline constexpr int kFakeChannels = 4;
 inline constexpr int kFakePatches = 42;
 /// What every fake bake says that a ray of a row costs, seconds.
 inline constexpr double kFakeRayCost = 0.0625;
+/// What every fake bake says that it traced, and how fast.
+inline constexpr unsigned kFakeRays = 1000, kFakeRaysPerSecond = 250;
+/// What kNearlyDone says that it still needs, seconds.
+inline constexpr double kFakeSecondsLeft = 0.25;
 /// What every fake bake says of its error when it tells its progress.
 inline constexpr unsigned kFakePass = 2;
 inline constexpr double kFakeError = 0.25, kFakeErrorLow = 0.125, kFakeErrorHigh = 0.5;

@@ -21,7 +21,7 @@ import tempfile
 import threading
 import time
 
-BIN, SERVER, ENCODE_SCENE, SCENES, STUBS = (pathlib.Path(argument) for argument in sys.argv[1:6])
+BIN, SERVER, ENCODE_SCENE, SCENES, STUBS = (pathlib.Path(argument).resolve() for argument in sys.argv[1:6])
 sys.path.insert(0, str(STUBS))
 
 import grpc  # noqa: E402
@@ -55,7 +55,7 @@ class Server:
         self.log = open(place / "log", "a")
         self.process = subprocess.Popen(
             [SERVER, "--listen", self.address, "--data", place / "data", "--worker", BIN / "radbake-worker",
-             "--max-attempts", "1000000"],
+             "--max-attempts", "1000000", "--max-restarts", "1000000"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.log, env=environment)
 
     def is_alive(self):

@@ -1,79 +1,21 @@
 // The real server program: start, stop, signals, and what survives kill -9.
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <thread>
 
-#include "common/base/version.h"
+#include "tests/service/server_program.h"
 #include "tests/service/test_server.h"
 
 namespace radbake::testing {
 namespace {
 
 using ::testing::HasSubstr;
-
-/// A radbaked that is killed at the end if it still runs.
-class Program {
- public:
-  explicit Program(std::vector<std::string> arguments) {
-    int ends[2];
-    EXPECT_EQ(pipe2(ends, O_CLOEXEC), 0);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-    arguments.insert(arguments.begin(), RADBAKE_RADBAKED);
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    EXPECT_EQ(posix_spawn(&pid_, RADBAKE_RADBAKED, &actions, nullptr, argv.data(), environ), 0);
-    posix_spawn_file_actions_destroy(&actions);
-    close(ends[1]);
-    output_ = fdopen(ends[0], "r");
-  }
-  ~Program() {
-    if (pid_ > 0) end(SIGKILL);
-    fclose(output_);
-  }
-
-  /// Reads to the line that says where it listens; "" if it ends before.
-  std::string wait_for_address() {
-    char line[4096];
-    const std::string start = std::string("radbaked ") + kEngineVersion + " listening on ";
-    while (fgets(line, sizeof(line), output_)) {
-      output_text_ += line;
-      const std::string text = line;
-      if (text.starts_with(start)) return text.substr(start.size(), text.size() - start.size() - 1);
-    }
-    return "";
-  }
-
-  int wait() {
-    char line[4096];
-    while (fgets(line, sizeof(line), output_)) output_text_ += line;
-    int status = 0;
-    waitpid(std::exchange(pid_, 0), &status, 0);
-    return status;
-  }
-  int end(int signal) {
-    kill(pid_, signal);
-    return wait();
-  }
-  const std::string& output() const { return output_text_; }
-
- private:
-  pid_t pid_ = 0;
-  FILE* output_ = nullptr;
-  std::string output_text_;
-};
 
 class RadbakedTest : public ::testing::Test {
  protected:
@@ -87,7 +29,7 @@ class RadbakedTest : public ::testing::Test {
 };
 
 TEST_F(RadbakedTest, SaysWhereItListensAndStopsOnSigterm) {
-  Program program(
+  ServerProgram program(
       {"--listen", "127.0.0.1:0", "--data", (folder_.path() / "data").string(), "--worker", RADBAKE_FAKE_WORKER});
   const std::string address = program.wait_for_address();
   EXPECT_THAT(address, ::testing::MatchesRegex("127.0.0.1:[0-9]+"));
@@ -98,28 +40,29 @@ TEST_F(RadbakedTest, SaysWhereItListensAndStopsOnSigterm) {
 }
 
 TEST_F(RadbakedTest, RefusesADataFolderInUse) {
-  Program first(arguments());
+  ServerProgram first(arguments());
   ASSERT_NE(first.wait_for_address(), "");
-  Program second(arguments());
+  ServerProgram second(arguments());
   EXPECT_EQ(second.wait_for_address(), "");
   EXPECT_EQ(WEXITSTATUS(second.wait()), 4);
   EXPECT_THAT(second.output(), HasSubstr("in use by another radbaked"));
 }
 
 TEST_F(RadbakedTest, RefusesAnAddressInUse) {
-  Program first(
+  ServerProgram first(
       {"--listen", "127.0.0.1:0", "--data", (folder_.path() / "a").string(), "--worker", RADBAKE_FAKE_WORKER});
   const std::string address = first.wait_for_address();
-  Program second({"--listen", address, "--data", (folder_.path() / "b").string(), "--worker", RADBAKE_FAKE_WORKER});
+  ServerProgram second(
+      {"--listen", address, "--data", (folder_.path() / "b").string(), "--worker", RADBAKE_FAKE_WORKER});
   EXPECT_EQ(second.wait_for_address(), "");
   EXPECT_EQ(WEXITSTATUS(second.wait()), 4);
   EXPECT_THAT(second.output(), HasSubstr(address));
 }
 
 TEST_F(RadbakedTest, ExitsWith2OnAnOptionThatDoesNotExist) {
-  Program program({"--no-such-option"});
+  ServerProgram program({"--no-such-option"});
   EXPECT_EQ(WEXITSTATUS(program.wait()), 2);
-  Program level({"--log-level", "loud"});
+  ServerProgram level({"--log-level", "loud"});
   EXPECT_EQ(WEXITSTATUS(level.wait()), 2);
 }
 
@@ -127,7 +70,7 @@ TEST_F(RadbakedTest, ReadsItsOptionsFromAFile) {
   std::ofstream(folder_.path() / "radbaked.ini") << "max-running=3\nlog-json=true\n";
   std::vector<std::string> all = arguments();
   all.insert(all.end(), {"--config", (folder_.path() / "radbaked.ini").string()});
-  Program program(all);
+  ServerProgram program(all);
   const std::string address = program.wait_for_address();
   v1::Capabilities capabilities;
   ASSERT_TRUE(TestClient(address).server->GetCapabilities(new_context().get(), {}, &capabilities).ok());
@@ -139,13 +82,13 @@ TEST_F(RadbakedTest, ReadsItsOptionsFromAFile) {
 TEST_F(RadbakedTest, RunsAJobAgainAfterKill9AndPublishesItOnce) {
   std::string name;
   {
-    Program program(arguments());
+    ServerProgram program(arguments());
     TestClient client(program.wait_for_address());
     name = client.submit(kSucceedSecondTime).name();
     EXPECT_EQ(client.wait_for(name, v1::FORM_FACTORS).state(), v1::FORM_FACTORS);
     EXPECT_EQ(WTERMSIG(program.end(SIGKILL)), SIGKILL);
   }
-  Program program(arguments());
+  ServerProgram program(arguments());
   TestClient client(program.wait_for_address());
   const auto watched = client.watch(name);
   EXPECT_EQ(watched.finished().state(), v1::SUCCEEDED);
@@ -164,13 +107,13 @@ TEST_F(RadbakedTest, RunsAJobAgainAfterKill9AndPublishesItOnce) {
 TEST_F(RadbakedTest, GivesUpAJobThatTookTheServerDownFiveTimes) {
   std::string name;
   for (int i = 0; i < 5; ++i) {
-    Program program(arguments());
+    ServerProgram program(arguments());
     TestClient client(program.wait_for_address());
     if (name.empty()) name = client.submit(kRunUntilCancelled).name();
     EXPECT_EQ(client.wait_for(name, v1::FORM_FACTORS).state(), v1::FORM_FACTORS);
     program.end(SIGKILL);
   }
-  Program program(arguments());
+  ServerProgram program(arguments());
   const v1::Bake bake = TestClient(program.wait_for_address()).get(name);
   EXPECT_EQ(bake.state(), v1::FAILED);
   EXPECT_THAT(bake.error().message(), HasSubstr("5 times"));
@@ -179,14 +122,14 @@ TEST_F(RadbakedTest, GivesUpAJobThatTookTheServerDownFiveTimes) {
 TEST_F(RadbakedTest, QueuesRunningJobsAgainWhenItIsStopped) {
   std::string running, waiting;
   {
-    Program program(arguments());
+    ServerProgram program(arguments());
     TestClient client(program.wait_for_address());
     running = client.submit(kSucceedSecondTime).name();
     waiting = client.submit(kSucceed).name();
     client.wait_for(running, v1::FORM_FACTORS);
     EXPECT_EQ(program.end(SIGTERM), 0);
   }
-  Program program(arguments());
+  ServerProgram program(arguments());
   TestClient client(program.wait_for_address());
   EXPECT_EQ(client.watch(running).finished().state(), v1::SUCCEEDED);
   EXPECT_EQ(client.watch(waiting).finished().state(), v1::SUCCEEDED);
@@ -197,13 +140,13 @@ TEST_F(RadbakedTest, QueuesRunningJobsAgainWhenItIsStopped) {
 TEST_F(RadbakedTest, KeepsResultsAcrossAStart) {
   std::string name;
   {
-    Program program(arguments());
+    ServerProgram program(arguments());
     TestClient client(program.wait_for_address());
     name = client.submit(kSucceed).name();
     EXPECT_EQ(client.watch(name).finished().state(), v1::SUCCEEDED);
     program.end(SIGKILL);
   }
-  Program program(arguments());
+  ServerProgram program(arguments());
   TestClient client(program.wait_for_address());
   const v1::Bake bake = client.get(name);
   EXPECT_EQ(bake.state(), v1::SUCCEEDED);
@@ -235,7 +178,7 @@ TEST_F(RadbakedTest, EndsWithTheProcessThatStartedIt) {
 }
 
 TEST_F(RadbakedTest, ReportsItsHealthAndLeavesTheSecondSignalToKill) {
-  Program program(arguments());
+  ServerProgram program(arguments());
   TestClient client(program.wait_for_address());
   const std::string name = client.submit(kRunUntilCancelled).name();
   EXPECT_EQ(client.wait_for(name, v1::FORM_FACTORS).state(), v1::FORM_FACTORS);

@@ -13,6 +13,8 @@ using Json = nlohmann::ordered_json;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
+constexpr const char* kTrace = "4bf92f3577b34da6a3ce929d0e0e4736";
+
 v1::Bake bake() {
   v1::Bake bake;
   bake.set_name("bakes/1");
@@ -49,14 +51,16 @@ void run_of_a_submit(Reporter& reporter) {
 }
 
 TEST(JsonReporter, PrintsOneEventALineAndTheJobFirst) {
-  const auto reporter = make_json_reporter(true);
+  const auto reporter = make_json_reporter(true, kTrace);
   std::vector<std::string> events;
-  for (const std::string& line : stdout_of(*reporter, run_of_a_submit)) events.push_back(Json::parse(line)["event"]);
+  const auto lines = stdout_of(*reporter, run_of_a_submit);
+  for (const std::string& line : lines) events.push_back(Json::parse(line)["event"]);
+  EXPECT_EQ(Json::parse(lines[0])["trace_id"], kTrace);
   EXPECT_THAT(events, ElementsAre("submitted", "warning", "snapshot", "state", "progress", "finished", "written"));
 }
 
 TEST(JsonReporter, PrintsExactlyOneObjectForACommandThatIsNoStream) {
-  const auto downloads = make_json_reporter(false);
+  const auto downloads = make_json_reporter(false, kTrace);
   const auto lines = stdout_of(*downloads, [](Reporter& reporter) {
     reporter.stage("downloading", -1);
     reporter.note("a note");
@@ -65,7 +69,7 @@ TEST(JsonReporter, PrintsExactlyOneObjectForACommandThatIsNoStream) {
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(Json::parse(lines[0])["files"][0], "report.json");
 
-  const auto fails = make_json_reporter(false);
+  const auto fails = make_json_reporter(false, kTrace);
   const auto failure = stdout_of(*fails, [](Reporter& reporter) {
     reporter.failed({ErrorCode::kUnavailable, "nobody there"}, kServerUnreachable);
   });
@@ -74,6 +78,7 @@ TEST(JsonReporter, PrintsExactlyOneObjectForACommandThatIsNoStream) {
   EXPECT_EQ(error["exit_code"], 4);
   EXPECT_EQ(error["code"], "unavailable");
   EXPECT_EQ(error["message"], "nobody there");
+  EXPECT_EQ(error["trace_id"], kTrace);
 }
 
 TEST(TextReporter, PrintsTheJobFirstAndTheFilesLastOnStdout) {

@@ -51,6 +51,8 @@ inline constexpr char kSubmitFooter[] =
     "      light from a sky image whose 1 is 2500 nit; direct and indirect light and openness as maps of their own\n"
     "  radbake submit room.glb -o baked/ --effect interreflection=off --effect alpha_mask=off\n"
     "      direct light only, and leaves of a tree as full squares: what an effect is worth\n"
+    "  radbake submit level.glb --server bakery:7419 --detach --max-error 1%\n"
+    "      overnight: prints the bake's name and leaves; radbake list and radbake download find it in the morning\n"
     "  radbake submit room.glb --dry-run\n"
     "      checks all, prints the plan, bakes nothing\n"
     "  radbake submit lab.glb -o baked/ --form-factors analytic --max-patches 500 --solver lu\n"
@@ -78,6 +80,9 @@ inline constexpr char kPlanFooter[] =
     "  radbake plan room.glb --json | jq .prediction.total.cpu_seconds\n\n";
 
 inline constexpr char kListFooter[] =
+    "\nOf bakes that wait: their place in the queue and when they may start; \"shares NAME\" where an equal bake runs "
+    "for\n"
+    "them, too.\n"
     "\nExamples:\n"
     "  radbake list --server bakery:7419\n"
     "  radbake list --json | jq -r '.bakes[] | select(.state == \"FAILED\") | .name'\n\n";

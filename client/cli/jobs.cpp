@@ -21,13 +21,24 @@ std::string format_time(std::int64_t unix_ms) {
   return text;
 }
 
+/// Where a bake stands that waits: "next, at about 07:30".
+std::string place_of(const v1::Bake& bake) {
+  std::string text = bake.shares().empty() ? "" : "shares " + bake.shares();
+  if (bake.queue_position() > 0) text = "number " + std::to_string(bake.queue_position());
+  if (bake.expected_start_unix_ms() > 0) {
+    text += (text.empty() ? "" : ", ") + ("starts at about " + format_time(bake.expected_start_unix_ms()));
+  }
+  return text.empty() ? "" : " (" + text + ")";
+}
+
 std::string describe(const v1::Bake& bake) {
   std::string state = stage_name(bake.state());
   if (bake.state() > v1::QUEUED && bake.state() < v1::SUCCEEDED) {
     state += " " + std::to_string(static_cast<int>(bake.progress().fraction() * 100)) + " %";
   }
   state.resize(std::max<std::size_t>(state.size(), 18), ' ');
-  return bake.name() + "  " + format_time(bake.created_unix_ms()) + "  " + state + "  " + bake.label() + "\n";
+  return bake.name() + "  " + format_time(bake.created_unix_ms()) + "  " + state + "  " + bake.label() +
+         place_of(bake) + (bake.from_store() ? " (from the store)" : "") + "\n";
 }
 
 std::string joined(const google::protobuf::RepeatedPtrField<std::string>& words) {

@@ -64,8 +64,14 @@ class Parser {
                        "radbake " + app_.get_subcommands().front()->get_name() +
                            " needs a server: --server HOST:PORT or unix:PATH, or RADBAKE_SERVER\n"};
     }
-    if (line_.command == Command::kSubmit && line_.folder.empty() && !line_.dry_run) {
-      return EarlyExit{kUsage, "", "--out is required: the folder for the results, or --dry-run\n"};
+    if (line_.command == Command::kSubmit && line_.folder.empty() && !line_.dry_run && !line_.detach) {
+      return EarlyExit{kUsage, "", "--out is required: the folder for the results, or --dry-run, or --detach\n"};
+    }
+    if (line_.detach && line_.server.empty()) {
+      return EarlyExit{kUsage, "", "--detach needs a server that stays: --server HOST:PORT or unix:PATH\n"};
+    }
+    if (line_.detach && (line_.strict || !line_.folder.empty())) {
+      return EarlyExit{kUsage, "", "--detach waits for no result: without --out and --strict\n"};
     }
     if (line_.command == Command::kSubmit && line_.files.vertex_colors && line_.bake.output == v1::OUTPUT_LIGHTMAP) {
       return EarlyExit{kUsage, "", "--vertex-colors needs light by vertex: --output vertices or --output both\n"};
@@ -134,6 +140,15 @@ class Parser {
     sub->add_flag("--dry-run", line_.dry_run,
                   "Check all that a submit checks and print the plan, as radbake plan does; bakes and writes nothing");
     options::add_bake_options(*sub, line_.bake);
+    sub->add_flag(
+        "--detach", line_.detach,
+        "Leave once the server has accepted the bake: radbake watch and radbake download find it by its name");
+    sub->add_option("--priority", line_.priority, "Where the server has a queue: higher starts earlier")
+        ->check(CLI::Range(-100, 100))
+        ->capture_default_str()
+        ->type_name("N");
+    sub->add_flag("--no-cache", line_.no_cache,
+                  "Bake it, also where the server has the result of an equal bake or runs one");
     sub->add_flag("--strict", line_.strict,
                   "Exit with 7 where the error asked for was not reached; all files are written all the same");
     add_files(sub);

@@ -44,6 +44,9 @@ struct CommandLine {
   bool force = false;            ///< submit, download
   FileChoices files;             ///< submit, download
   bool dry_run = false;          ///< submit
+  bool detach = false;           ///< submit: leave once the bake is accepted
+  bool no_cache = false;         ///< submit: run it, whatever the server has of it
+  int priority = 0;              ///< submit
   bool strict = false;           ///< submit: an error that is not reached is an exit code of its own
   double plan_seconds = 60;      ///< plan: how long to wait for the answer
   CompareChoices compare;        ///< compare

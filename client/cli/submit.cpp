@@ -67,8 +67,12 @@ bool tell_error(const CommandContext& context, const v1::BakeReport& report) {
 ExitCode run_submit(const CommandContext& context) {
   if (context.line.dry_run) return run_plan(context);
   const CommandLine& line = context.line;
-  Result<ResultFolder> folder = ResultFolder::open(line.folder, line.force);
-  if (!folder.ok()) return fail(context, folder.error(), kUsage);
+  std::optional<ResultFolder> folder;
+  if (!line.detach) {
+    Result<ResultFolder> opened = ResultFolder::open(line.folder, line.force);
+    if (!opened.ok()) return fail(context, opened.error(), kUsage);
+    folder.emplace(std::move(opened).value());
+  }
   Stopwatch stages;
   context.reporter.stage("connecting", -1);
   Result<Session> session = open_session(context);
@@ -91,6 +95,13 @@ ExitCode run_submit(const CommandContext& context) {
   if (!bake.ok()) return fail(context, session->explain(bake.error()));
   context.reporter.submitted(*bake);
   const std::string name = bake->name();
+  if (bake->from_store()) {
+    context.reporter.note("the server has baked this before: its result is the answer (--no-cache: bake again)");
+  }
+  if (line.detach) {
+    context.reporter.note(name + " goes on without us; get it with radbake download " + name + " -o DIR");
+    return kDone;
+  }
   // Not after the bake: hours of work would be out of reach, on a private server for ever.
   if (const Result<const image::ImageCodec*> images = loading.get(); !images.ok()) {
     Error error = images.error();

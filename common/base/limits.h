@@ -23,6 +23,7 @@ struct Limits {
   std::uint64_t max_patches = 1'000'000;
   std::uint64_t max_queued_bakes = 1000;
   std::uint64_t max_running_bakes = 1;
+  std::uint64_t max_content_bytes = 0;               ///< of a tenant's blobs, uploads included; 0: as the disk has
   std::uint64_t max_running_plans = 4;               ///< plans do not wait
   std::uint64_t min_free_disk_bytes = 256ULL << 20;  ///< below it nothing new is taken
 };
@@ -49,6 +50,7 @@ Message limits_message(const Limits& limits) {
   message.set_max_patches(limits.max_patches);
   message.set_max_queued_bakes(limits.max_queued_bakes);
   message.set_max_running_bakes(limits.max_running_bakes);
+  message.set_max_content_bytes(limits.max_content_bytes);
   message.set_max_running_plans(limits.max_running_plans);
   message.set_min_free_disk_bytes(limits.min_free_disk_bytes);
   return message;

@@ -73,15 +73,42 @@ void Job::set_progress(const JobProgress& progress) {
     ++progress_.version;
   }
   wake_watchers();
+  for (const auto& follower : followers()) follower->set_progress(progress);
 }
 
 void Job::set_tiles(std::shared_ptr<TileSpool> tiles) {
+  for (const auto& follower : followers()) follower->set_tiles(tiles);
   const std::lock_guard lock(mutex_);
   tiles_ = std::move(tiles);
   progress_.progress = {};
 }
 
-void Job::tile_arrived() { wake_watchers(); }
+void Job::tile_arrived() {
+  wake_watchers();
+  for (const auto& follower : followers()) follower->tile_arrived();
+}
+
+void Job::forget_lost_attempts() {
+  const std::lock_guard lock(mutex_);
+  record_.lost_attempts = record_.failed_attempts = 0;
+}
+
+void Job::add_follower(const std::shared_ptr<Job>& follower) {
+  follower->set_tiles(tiles());
+  if (const LatestProgress latest = progress(); latest.version > 0) follower->set_progress(latest.progress);
+  const std::lock_guard lock(mutex_);
+  followers_.push_back(follower);
+}
+
+void Job::remove_follower(const std::shared_ptr<Job>& follower) {
+  const std::lock_guard lock(mutex_);
+  std::erase(followers_, follower);
+}
+
+std::vector<std::shared_ptr<Job>> Job::followers() const {
+  const std::lock_guard lock(mutex_);
+  return followers_;
+}
 
 void Job::close() {
   {

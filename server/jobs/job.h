@@ -49,6 +49,12 @@ class Job {
   void set_tiles(std::shared_ptr<TileSpool> tiles);
   void tile_arrived();
   void close();
+  /// It has got on: what it lost before does not count.
+  void forget_lost_attempts();
+  /// From now on another job shows this one's progress and tiles.
+  void add_follower(const std::shared_ptr<Job>& follower);
+  void remove_follower(const std::shared_ptr<Job>& follower);
+  std::vector<std::shared_ptr<Job>> followers() const;
 
  private:
   void wake_watchers();
@@ -59,6 +65,7 @@ class Job {
   LatestProgress progress_;
   std::shared_ptr<TileSpool> tiles_;
   bool is_closing_ = false;
+  std::vector<std::shared_ptr<Job>> followers_;
 
   std::mutex watchers_mutex_;  // held while watchers are woken, so that unsubscribe() waits for the call
   std::map<std::uint64_t, std::function<void()>> watchers_;

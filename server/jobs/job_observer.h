@@ -11,6 +11,7 @@ enum class AttemptEnd {
   kServerStopping,  ///< the job goes back to the queue
   kWorkerDied,      ///< by itself, without an outcome
   kWorkerKilled,    ///< it overstepped one of its limits
+  kDiskRefused,     ///< what it sent could not be kept
 };
 
 /// Is told what becomes of jobs, for numbers about them. Calls come from the queue's thread and must be quick.
@@ -20,6 +21,8 @@ class JobObserver {
   /// A job leaves a state after so many seconds in it; it is recorded already.
   virtual void state_changed(store::JobState from, store::JobState to, double seconds_in_from) = 0;
   virtual void attempt_ended(AttemptEnd end) = 0;
+  /// A job was accepted; it was, or was not, answered by a bake with the same key that ended well or runs.
+  virtual void cache_looked_up(bool is_hit) = 0;
 };
 
 }  // namespace radbake::jobs

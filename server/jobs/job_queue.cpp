@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "common/log/log.h"
@@ -13,7 +14,16 @@ using store::JobRecord;
 using store::JobState;
 using store::StateChange;
 
-JobQueue::JobQueue(QueueOptions options, store::JobStore& jobs, store::ContentStore& content)
+namespace {
+
+std::int64_t unix_ms_now() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+JobQueue::JobQueue(QueueOptions options, store::JobStore& jobs, store::TenantContent& content)
     : options_(std::move(options)), store_(jobs), content_(content) {}
 
 JobQueue::~JobQueue() {
@@ -25,9 +35,11 @@ Result<void> JobQueue::start(WorkerGate& gate) {
   gate_ = &gate;
   raise_open_file_limit();
   watchdog_ = std::jthread([this](std::stop_token stop) { watch_limits(stop); });
-  RADBAKE_RETURN_IF_ERROR(thread_.run([this] { return recover(); }));
-  has_recovered_ = true;
-  return {};
+  return thread_.run([this] {
+    const Result<void> recovered = recover();
+    has_recovered_ = recovered.ok();
+    return recovered;
+  });
 }
 
 Result<void> JobQueue::check_recovered() const {
@@ -40,23 +52,30 @@ Result<void> JobQueue::recover() {
   for (const JobRecord& record : records) {
     RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
     const auto job = std::make_shared<Job>(record, std::move(events));
+    const auto leader = record.owner.is_shared ? find_leader(record.owner, record.bake_key) : nullptr;
     {
       const std::lock_guard lock(mutex_);
       live_[record.name] = job;
     }
     if (is_running(record.state)) {
-      const std::uint32_t lost = record.lost_attempts + 1;
+      const std::uint32_t lost = record.lost_attempts + (leader ? 0 : 1);
       if (lost >= options_.max_lost_attempts) {
-        RADBAKE_RETURN_IF_ERROR(change(job, {JobState::kFailed, record.attempt, lost, "given up", "",
-                                             internal_error("the server ended unexpectedly " + std::to_string(lost) +
-                                                            " times while this bake ran; the limit is " +
-                                                            std::to_string(options_.max_lost_attempts))}));
+        fail(job, internal_error("the server ended unexpectedly " + std::to_string(lost) +
+                                 " times while this bake ran, and it did not get on; the limit is " +
+                                 std::to_string(options_.max_lost_attempts)));
         continue;
       }
-      RADBAKE_RETURN_IF_ERROR(change(job, {JobState::kQueued, record.attempt + 1, lost,
-                                           "the server ended unexpectedly; queued again", "", std::nullopt}));
+      RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kQueued,
+                                           .attempt = record.attempt + 1,
+                                           .lost_attempts = lost,
+                                           .message = "the server ended unexpectedly; queued again",
+                                           .failed_attempts = record.failed_attempts}));
     }
-    waiting_.push_back(job);
+    if (leader) {
+      follow(job, leader);
+    } else {
+      line_up(job);
+    }
   }
   run_waiting_jobs();
   thread_.post([this] { make_worker_ready(); });
@@ -74,9 +93,10 @@ void JobQueue::make_worker_ready() {
   }
 }
 
-Result<std::shared_ptr<Job>> JobQueue::find_request(const std::string& request_id, const std::string& body_sha256) {
+Result<std::shared_ptr<Job>> JobQueue::find_request(const std::string& tenant, const std::string& request_id,
+                                                    const std::string& body_sha256) {
   RADBAKE_RETURN_IF_ERROR(check_recovered());
-  RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> record, store_.find_request(request_id, body_sha256));
+  RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> record, store_.find_request(tenant, request_id, body_sha256));
   if (!record) return std::shared_ptr<Job>();
   return find(record->name);
 }
@@ -86,30 +106,58 @@ Result<std::shared_ptr<Job>> JobQueue::submit(const store::NewJob& job) {
 }
 
 Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) {
-  RADBAKE_ASSIGN_OR_RETURN(const std::shared_ptr<Job> known, find_request(new_job.request_id, new_job.body_sha256));
+  const store::JobOwner& owner = new_job.owner;
+  const LogTrace trace(owner.trace_id);
+  RADBAKE_ASSIGN_OR_RETURN(const std::shared_ptr<Job> known,
+                           find_request(owner.tenant, new_job.request_id, new_job.body_sha256));
   if (known) return known;
   if (is_refusing_ || is_draining_) {
     return Error{ErrorCode::kUnavailable, "the server is stopping: submit again later"};
   }
-  if (waiting_.size() >= options_.max_queued) {
-    return Error{ErrorCode::kResourceExhausted, std::to_string(waiting_.size()) +
-                                                    " bakes are waiting, max_queued_bakes is " +
-                                                    std::to_string(options_.max_queued)};
+
+  // Baked before, or being baked?
+  std::shared_ptr<Job> leader;
+  if (owner.is_shared) {
+    RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> stored, find_result(owner, new_job.bake_key));
+    if (stored) {
+      if (options_.observer != nullptr) options_.observer->cache_looked_up(true);
+      RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job, &*stored));
+      spdlog::info("{} answered from the store: '{}', the result of {}", record.name, record.label, stored->name);
+      return find(record.name);
+    }
+    leader = find_leader(owner, new_job.bake_key);
   }
-  RADBAKE_ASSIGN_OR_RETURN(JobRecord record, store_.create(new_job));
-  record.trace_id = new_job.trace_id;
-  const LogTrace trace(record.trace_id);
+  if (const std::size_t num_waiting = waiting_.size() + leaders_.size(); num_waiting >= options_.max_queued) {
+    return Error{
+        ErrorCode::kResourceExhausted,
+        std::to_string(num_waiting) + " bakes are waiting, max_queued_bakes is " + std::to_string(options_.max_queued)};
+  }
+  RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job));
+  if (options_.observer != nullptr) options_.observer->cache_looked_up(leader != nullptr);
   RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
   const auto job = std::make_shared<Job>(record, std::move(events));
   {
     const std::lock_guard lock(mutex_);
     live_[record.name] = job;
   }
-  waiting_.push_back(job);
   spdlog::info("{} queued: '{}', bake key {}", record.name, record.label, record.bake_key);
-  // The answer to the submit does not wait for the worker's start.
-  thread_.post([this] { run_waiting_jobs(); });
+  if (leader) {
+    follow(job, leader);
+  } else {
+    line_up(job);
+    // The answer to the submit does not wait for the worker's start.
+    thread_.post([this] { run_waiting_jobs(); });
+  }
   return job;
+}
+
+Result<std::optional<JobRecord>> JobQueue::find_result(const store::JobOwner& owner, const std::string& bake_key) {
+  RADBAKE_ASSIGN_OR_RETURN(std::optional<JobRecord> stored, store_.find_result(owner.tenant, bake_key));
+  if (!stored) return stored;
+  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(owner.tenant));
+  RADBAKE_ASSIGN_OR_RETURN(const std::vector<Digest> outputs, store_.outputs(stored->name));
+  if (!content->find_missing(outputs).empty()) stored.reset();
+  return stored;
 }
 
 std::shared_ptr<Job> JobQueue::find_live(const std::string& name) const {
@@ -133,8 +181,35 @@ Result<std::shared_ptr<Job>> JobQueue::find(const std::string& name) {
   return std::make_shared<Job>(std::move(record), std::move(events));
 }
 
-Result<std::vector<JobRecord>> JobQueue::list(std::uint32_t num_jobs, std::int64_t before_id) {
-  return store_.list(num_jobs, before_id);
+Result<std::vector<JobRecord>> JobQueue::list(const std::optional<std::string>& tenant, std::uint32_t num_jobs,
+                                              std::int64_t before_id) {
+  return store_.list(tenant, num_jobs, before_id);
+}
+
+std::map<std::string, QueuePlace> JobQueue::places() {
+  return thread_.run([this] {
+    std::map<std::string, QueuePlace> places;
+    // Each slot is free when its bake may end.
+    const std::int64_t now = unix_ms_now();
+    std::multiset<double> free_in;
+    for (const auto& [name, job] : live_) {
+      if (!runs_.contains(name)) continue;
+      const double left = job->progress().progress.seconds_left;
+      free_in.insert(left >= 0 ? left : usual_seconds_);
+    }
+    while (free_in.size() < options_.max_running) free_in.insert(0);
+    std::uint32_t position = 0;
+    for (const std::string& name : waiting_.order(usual_seconds_)) {
+      const double starts_in = *free_in.begin();
+      free_in.erase(free_in.begin());
+      free_in.insert(starts_in + usual_seconds_);
+      places[name] = {++position, now + static_cast<std::int64_t>(1000 * starts_in), ""};
+    }
+    for (const auto& [follower, leader] : leaders_) {
+      places[follower] = {0, places.contains(leader) ? places[leader].expected_start_unix_ms : 0, leader};
+    }
+    return places;
+  });
 }
 
 Job::LatestProgress JobQueue::progress_of(const std::string& name) const {
@@ -157,14 +232,19 @@ void JobQueue::request_cancel(WorkerRun& run) {
 
 Result<void> JobQueue::cancel_live(const std::string& name) {
   const std::shared_ptr<Job> job = find_live(name);
-  if (!job) return {};
+  if (!job || is_unsaved(job)) return {};
   if (const auto run = find_run(name)) {
     request_cancel(*run);
     return {};
   }
-  std::erase(waiting_, job);
   const JobRecord record = job->record();
-  return change(job, {JobState::kCancelled, record.attempt, record.lost_attempts, "cancelled before it ran", "", {}});
+  RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kCancelled,
+                                       .attempt = record.attempt,
+                                       .lost_attempts = record.lost_attempts,
+                                       .message = "cancelled before it ran"}));
+  waiting_.erase(name);
+  leave_leader(job);
+  return {};
 }
 
 Result<std::shared_ptr<Job>> JobQueue::finish(const std::string& name) {
@@ -174,242 +254,17 @@ Result<std::shared_ptr<Job>> JobQueue::finish(const std::string& name) {
 }
 
 void JobQueue::finish_live(const std::string& name) {
-  if (!find_live(name)) return;
-  to_finish_.insert(name);
-  if (const auto run = find_run(name)) run->request_finish();
-}
-
-void JobQueue::run_waiting_jobs() {
-  while (!is_refusing_ && !is_draining_ && !waiting_.empty() && num_running_ < options_.max_running) {
-    const std::shared_ptr<Job> job = waiting_.front();
-    waiting_.pop_front();
-    start_job(job);
-  }
-}
-
-void JobQueue::add_run(const std::shared_ptr<WorkerRun>& run) {
-  {
-    const std::lock_guard lock(mutex_);
-    runs_[run->assignment().job] = run;
-  }
-  runs_changed_.notify_all();
-}
-
-void JobQueue::start_job(const std::shared_ptr<Job>& job) {
-  const JobRecord record = job->record();
-  const std::string name = record.name;
-  // The attempt is on disk before there is a worker that claims it.
-  if (auto changed = change(job, {JobState::kPreparing,
-                                  record.attempt,
-                                  record.lost_attempts,
-                                  "attempt " + std::to_string(record.attempt) + " starts",
-                                  "",
-                                  {}});
-      !changed.ok()) {
-    return fail(job, changed.error());
-  }
-  auto spool = TileSpool::create(options_.spool_folder);
-  if (!spool.ok()) return fail(job, spool.error());
-  job->set_tiles(*spool);
-
-  RunEvents events;
-  events.on_progress = [this, job, last = JobState::kPreparing](const JobProgress& progress) mutable {
-    if (!is_running(progress.state)) return;
-    if (std::exchange(last, progress.state) != progress.state) {
-      thread_.post([this, name = job->record().name, state = progress.state] { advance(name, state); });
-    }
-    job->set_progress(progress);
-  };
-  events.on_tile = [job, spool = *spool, is_full = false](const std::string& tile) mutable {
-    if (is_full) return;
-    // Tiles are a preview: without room for them the bake itself goes on.
-    if (auto appended = spool->append(tile); !appended.ok()) {
-      is_full = true;
-      spdlog::warn("no more tiles of this attempt are kept: {}", appended.error().message);
-    }
-    job->tile_arrived();
-  };
-  events.on_outcome = [this, name](WorkOutcome outcome) {
-    thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
-  };
-  events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
-  const auto run =
-      std::make_shared<WorkerRun>(WorkerRun::Assignment{name, record.attempt, false, record.work, std::nullopt,
-                                                        record.created_unix_ms, record.trace_id},
-                                  options_.worker, content_, std::move(events));
-  if (to_finish_.contains(name)) run->request_finish();
-  add_run(run);
-  ++num_running_;
-  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
-    fail(job, started.error());
-    end_run(name, {});
-  }
-}
-
-void JobQueue::advance(const std::string& name, JobState state) {
   const std::shared_ptr<Job> job = find_live(name);
   if (!job) return;
-  const JobRecord record = job->record();
-  // Passes go through the stages again; the record tells the furthest that was come to, and progress the present one.
-  if (!is_running(record.state) || record.state >= state) return;
-  if (auto changed = change(job, {state, record.attempt, record.lost_attempts, "", "", {}}); !changed.ok()) {
-    spdlog::error("{}: {}", name, changed.error().message);
+  to_finish_.insert(name);
+  // Those who share the run want all of it.
+  if (leader_of(name)) {
+    leave_leader(job);
+    queue_again(job, "runs by itself, to be finished", false);
   }
-}
-
-Result<void> JobQueue::change(const std::shared_ptr<Job>& job, StateChange change) {
-  const JobRecord before = job->record();
-  const std::string& name = before.name;
-  const LogTrace trace(before.trace_id);
-  if (change.message.empty()) change.message = job_state_name(change.state);
-  const std::int64_t entered_unix_ms = job->entered_unix_ms();
-  RADBAKE_ASSIGN_OR_RETURN(store::RecordedChange recorded, store_.append_event(name, change));
-  recorded.record.trace_id = before.trace_id;
-  const JobRecord& record = recorded.record;
-  if (options_.observer != nullptr) {
-    constexpr double kMsPerSecond = 1000;
-    options_.observer->state_changed(before.state, record.state,
-                                     static_cast<double>(recorded.event.unix_ms - entered_unix_ms) / kMsPerSecond);
-  }
-  spdlog::info("{} {} (attempt {}): {}", name, job_state_name(record.state), record.attempt,
-               record.error ? record.error->message : change.message);
-  const bool has_ended = is_terminal(record.state);
-  job->set_record(std::move(recorded.record), std::move(recorded.event));
-  if (has_ended) {
-    to_finish_.erase(name);
-    const std::lock_guard lock(mutex_);
-    live_.erase(name);
-  }
-  return {};
-}
-
-void JobQueue::fail(const std::shared_ptr<Job>& job, Error error) {
-  const JobRecord record = job->record();
-  const auto stored = change(job, {JobState::kFailed, record.attempt, record.lost_attempts, error.message, "", error});
-  if (stored.ok()) return;
-  // The disk refuses even this. Tell the watchers; the next start of the server runs the job again.
-  spdlog::error("{} failed and cannot be recorded: {}", record.name, stored.error().message);
-  job->close();
-  const std::lock_guard lock(mutex_);
-  live_.erase(record.name);
-}
-
-void JobQueue::end_work(const std::string& name, WorkOutcome outcome) {
-  const auto run = find_run(name);
-  if (plans_.contains(name)) {
-    switch (outcome.kind) {
-      case WorkOutcome::Kind::kSucceeded: finish_plan(name, std::move(outcome.result)); break;
-      case WorkOutcome::Kind::kFailed: finish_plan(name, std::move(outcome.error)); break;
-      case WorkOutcome::Kind::kCancelled: finish_plan(name, Error{ErrorCode::kCancelled, "cancelled"}); break;
-    }
-  } else if (const auto job = find_live(name)) {
-    const JobRecord record = job->record();
-    StateChange end{JobState::kSucceeded, record.attempt, record.lost_attempts, "", "", {}};
-    if (outcome.kind == WorkOutcome::Kind::kCancelled) {
-      end.state = JobState::kCancelled;
-      if (!run || !run->is_cancel_requested()) {
-        outcome = {WorkOutcome::Kind::kFailed, "", internal_error("the worker stopped without being asked to")};
-      }
-    }
-    if (outcome.kind == WorkOutcome::Kind::kSucceeded) end.result = std::move(outcome.result);
-    if (outcome.kind == WorkOutcome::Kind::kFailed) {
-      fail(job, std::move(outcome.error));
-    } else if (auto changed = change(job, std::move(end)); !changed.ok()) {
-      fail(job, changed.error());
-    }
-  }
-  if (run) run->accept();
-}
-
-void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
-  const auto run = find_run(name);
-  if (!run) return;
-  const std::string killed_because = run->kill_reason();
-  const LogTrace trace(run->assignment().trace_id);
-  const std::string reason =
-      "the worker " + (killed_because.empty() ? exit.reason : killed_because + " and was stopped");
-  if (run->assignment().is_plan) {
-    finish_plan(name, run->is_cancel_requested() ? Error{ErrorCode::kCancelled, "cancelled"} : internal_error(reason));
-  } else {
-    --num_running_;
-    if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
-    // Whoever still lives here got no outcome from its worker.
-    if (const auto job = find_live(name)) {
-      const JobRecord record = job->record();
-      if (run->is_cancel_requested()) {
-        if (auto changed = change(job, {JobState::kCancelled, record.attempt, record.lost_attempts, reason, "", {}});
-            !changed.ok()) {
-          fail(job, changed.error());
-        }
-      } else if (is_draining_) {
-        if (auto changed = change(job, {JobState::kQueued,
-                                        record.attempt + 1,
-                                        record.lost_attempts,
-                                        "the server is stopping; runs again at its next start",
-                                        "",
-                                        {}});
-            !changed.ok()) {
-          spdlog::error("{}: {}", name, changed.error().message);
-        }
-      } else {
-        fail(job, internal_error(reason));
-      }
-    }
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    runs_.erase(name);
-  }
-  runs_changed_.notify_all();
+  hand_over_followers(job);
+  if (const auto run = find_run(name)) run->request_finish();
   run_waiting_jobs();
-  make_worker_ready();
-}
-
-Result<std::string> JobQueue::start_plan(const store::Work& work, const std::string& trace_id, PlanDone on_done) {
-  RADBAKE_RETURN_IF_ERROR(check_recovered());
-  return thread_.run([&] { return start_plan_run(work, trace_id, std::move(on_done)); });
-}
-
-Result<std::string> JobQueue::start_plan_run(const store::Work& work, const std::string& trace_id, PlanDone on_done) {
-  if (is_refusing_ || is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
-  if (plans_.size() >= options_.max_running_plans) {
-    return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
-                                                    " plans are being made, max_running_plans is " +
-                                                    std::to_string(options_.max_running_plans)};
-  }
-  const std::string name = "plans/" + std::to_string(next_plan_++);
-  RunEvents events;
-  events.on_progress = [](const JobProgress&) {};
-  events.on_tile = [](const std::string&) {};
-  events.on_outcome = [this, name](WorkOutcome outcome) {
-    thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
-  };
-  events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
-  const auto run =
-      std::make_shared<WorkerRun>(WorkerRun::Assignment{name, 1, true, work, options_.plan_limit, 0, trace_id},
-                                  options_.worker, content_, std::move(events));
-  add_run(run);
-  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
-    const std::lock_guard lock(mutex_);
-    runs_.erase(name);
-    return started.error();
-  }
-  plans_[name] = std::move(on_done);
-  return name;
-}
-
-void JobQueue::cancel_plan(const std::string& name) {
-  thread_.post([this, name] {
-    if (const auto run = find_run(name)) request_cancel(*run);
-  });
-}
-
-void JobQueue::finish_plan(const std::string& name, Result<std::string> plan) {
-  const auto found = plans_.find(name);
-  if (found == plans_.end()) return;
-  const PlanDone on_done = std::move(found->second);
-  plans_.erase(found);
-  on_done(std::move(plan));
 }
 
 Result<std::shared_ptr<WorkerRun>> JobQueue::greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link) {
@@ -424,9 +279,13 @@ Result<std::shared_ptr<WorkerRun>> JobQueue::greet(const WorkerHello& hello, std
 void JobQueue::watch_limits(std::stop_token stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    if (runs_.empty()) {
-      runs_changed_.wait(lock, stop, [this] { return !runs_.empty(); });
+    if (runs_.empty() && disk_problem_.empty()) {
+      runs_changed_.wait(lock, stop, [this] { return !runs_.empty() || !disk_problem_.empty(); });
       continue;
+    }
+    if (!disk_problem_.empty() && WorkerRun::Clock::now() - disk_tried_at_ >= options_.disk_retry) {
+      disk_tried_at_ = WorkerRun::Clock::now();
+      thread_.post([this] { retry_disk(); });
     }
     // A worker that was asked to stop has little time: look at it often.
     constexpr std::chrono::milliseconds kCancelCheck{5};
@@ -455,7 +314,7 @@ void JobQueue::drain() {
     while (!plans_.empty()) {
       finish_plan(plans_.begin()->first, Error{ErrorCode::kUnavailable, "the server is stopping"});
     }
-    for (const auto& [name, run] : runs_) run->kill("was running when the server stopped");
+    for (const auto& [name, run] : runs_) run->kill("was running when the server stopped", WorkerRun::Blame::kServer);
     ready_.reset();
   });
   std::unique_lock lock(mutex_);
@@ -463,6 +322,11 @@ void JobQueue::drain() {
   const auto live = live_;
   lock.unlock();
   for (const auto& [name, job] : live) job->close();
+}
+
+std::string JobQueue::disk_problem() const {
+  const std::lock_guard lock(mutex_);
+  return disk_problem_;
 }
 
 }  // namespace radbake::jobs

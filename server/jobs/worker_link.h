@@ -27,11 +27,18 @@ struct InputFile {
   int fd = -1;
 };
 
+/// What an earlier attempt left, open for this one. Descriptors come after those of the inputs.
+struct CheckpointFile {
+  std::string name;
+  InputFile file;
+};
+
 /// What a worker is told to do.
 struct WorkOrder {
   bool is_plan = false;
   store::Work work;
   std::vector<InputFile> inputs;
+  std::vector<CheckpointFile> checkpoints;
   double waited_seconds = 0;  ///< since the job was accepted
   std::string trace_id;       ///< of the call that asked for it
 };
@@ -42,14 +49,16 @@ struct ResultChunk {
   std::uint64_t offset = 0;
   const std::string& bytes;
   std::optional<Digest> digest;  ///< with the last part
+  bool is_checkpoint = false;    ///< not a result, but for another attempt
 };
 
 /// How a worker says that its work ended.
 struct WorkOutcome {
   enum class Kind { kSucceeded, kFailed, kCancelled };
   Kind kind = Kind::kSucceeded;
-  std::string result;  ///< bytes of radbake.v1.BakeResult or Plan; kSucceeded only
-  Error error;         ///< kFailed only
+  std::string result;                ///< bytes of radbake.v1.BakeResult or Plan; kSucceeded only
+  Error error;                       ///< kFailed only
+  std::vector<Digest> outputs = {};  ///< that the result names
 };
 
 /// The way to one worker. The service implements it over the wire; calls do not block and may come from any thread.

@@ -7,6 +7,7 @@
 
 #include "common/base/version.h"
 #include "server/jobs/ready_worker.h"
+#include "server/store/failpoint.h"
 
 namespace radbake::jobs {
 namespace {
@@ -35,10 +36,16 @@ Result<void> WorkerRun::start(WorkerGate& gate, std::unique_ptr<ReadyWorker> rea
   // Open every input now: from here on the worker needs no file system.
   std::vector<store::FileDescriptor> files;
   handover::Assignment handed{assignment_.job, assignment_.attempt, {}};
-  WorkOrder order{assignment_.is_plan, assignment_.work, {}, 0, assignment_.trace_id};
+  WorkOrder order{assignment_.is_plan, assignment_.work, {}, {}, 0, assignment_.trace_id};
   for (const Digest& digest : assignment_.work.inputs) {
     RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(digest));
     order.inputs.push_back({digest, file.get()});
+    handed.inputs.push_back(file.get());
+    files.push_back(std::move(file));
+  }
+  for (const store::CheckpointRecord& checkpoint : assignment_.checkpoints) {
+    RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(checkpoint.digest));
+    order.checkpoints.push_back({checkpoint.name, {checkpoint.digest, file.get()}});
     handed.inputs.push_back(file.get());
     files.push_back(std::move(file));
   }
@@ -83,6 +90,7 @@ Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLi
   }
   // A worker of another build may bake other bytes under the same bake key.
   if (hello.protocol_major != kProtocolMajor || hello.engine_version != kEngineVersion) {
+    blame_ = Blame::kBake;
     kill_reason_ = "is version " + hello.engine_version + " with protocol " + std::to_string(hello.protocol_major) +
                    ", the server is version " + kEngineVersion + " with protocol " + std::to_string(kProtocolMajor);
     process_->kill_group();
@@ -121,21 +129,43 @@ Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
     last_heard_at_ = Clock::now();
   }
   if (!blob_.writer) {
-    RADBAKE_ASSIGN_OR_RETURN(blob_.writer, content_.new_blob());
-    blob_.name = chunk.blob;
+    auto writer = content_.new_blob();
+    if (!writer.ok()) return refuse_chunk(writer.error());
+    blob_ = {chunk.blob, std::move(writer).value()};
   }
   if (chunk.blob != blob_.name || chunk.offset != blob_.writer->size()) {
     return invalid_argument("the worker sent part " + std::to_string(chunk.offset) + " of result blob '" + chunk.blob +
                             "' after " + std::to_string(blob_.writer->size()) + " bytes of '" + blob_.name + "'");
   }
-  RADBAKE_RETURN_IF_ERROR(blob_.writer->append(std::as_bytes(std::span(chunk.bytes))));
+  if (auto appended = blob_.writer->append(std::as_bytes(std::span(chunk.bytes))); !appended.ok()) {
+    return refuse_chunk(appended.error());
+  }
   if (!chunk.digest) return {};
+  store::failpoint("result.blob_complete");
   auto committed = content_.commit(*blob_.writer, *chunk.digest);
   blob_.writer.reset();
+  if (!committed.ok()) return refuse_chunk(committed.error());
+  if (chunk.is_checkpoint) events_.on_checkpoint({chunk.blob, *chunk.digest});
   // Forcing a large blob to the disk takes a while in which the worker was not heard.
   const std::lock_guard lock(mutex_);
   last_heard_at_ = Clock::now();
-  return committed;
+  return {};
+}
+
+Result<void> WorkerRun::refuse_chunk(const Error& problem) {
+  // Bytes that are not what their digest says are the worker's fault.
+  if (problem.code == ErrorCode::kDataLoss) return problem;
+  kill("could not be heard: " + problem.message, Blame::kServer);
+  return {};
+}
+
+void WorkerRun::report_dropped_checkpoints(const std::vector<std::string>& names) {
+  {
+    const std::lock_guard lock(mutex_);
+    last_heard_at_ = Clock::now();
+    if (has_outcome_) return;
+  }
+  events_.on_drop_checkpoints(names);
 }
 
 void WorkerRun::report_outcome(WorkOutcome outcome, const std::vector<Digest>& blobs) {
@@ -149,6 +179,7 @@ void WorkerRun::report_outcome(WorkOutcome outcome, const std::vector<Digest>& b
     outcome = {WorkOutcome::Kind::kFailed, "",
                internal_error("the worker's result names blob " + missing.front().sha256 + ", which it never sent")};
   }
+  outcome.outputs = blobs;
   events_.on_outcome(std::move(outcome));
 }
 
@@ -181,29 +212,32 @@ void WorkerRun::accept() {
   if (link_) link_->accept();
 }
 
-void WorkerRun::kill(const std::string& reason) {
+void WorkerRun::kill(const std::string& reason, Blame blame) {
   const std::lock_guard lock(mutex_);
-  if (kill_reason_.empty()) kill_reason_ = reason;
+  if (kill_reason_.empty()) {
+    kill_reason_ = reason;
+    blame_ = blame;
+  }
   if (process_) process_->kill_group();
 }
 
-std::optional<std::string> WorkerRun::overstepped_limit(Clock::time_point now) const {
+std::optional<WorkerRun::Fault> WorkerRun::overstepped_limit(Clock::time_point now) const {
   if (accepted_at_) {
     if (now - *accepted_at_ <= options_.exit_grace) return std::nullopt;
-    return "did not exit within " + in_seconds(options_.exit_grace) + " of its end";
+    return Fault{"did not exit within " + in_seconds(options_.exit_grace) + " of its end"};
   }
   if (cancel_requested_at_ && now - *cancel_requested_at_ > options_.cancel_grace) {
-    return "did not stop within " + in_seconds(options_.cancel_grace) + " of being asked";
+    return Fault{"did not stop within " + in_seconds(options_.cancel_grace) + " of being asked"};
   }
   if (has_outcome_) return std::nullopt;  // the queue is storing it
   if (assignment_.time_limit && now - started_at_ > *assignment_.time_limit) {
-    return "took longer than its limit of " + in_seconds(*assignment_.time_limit);
+    return Fault{"took longer than its limit of " + in_seconds(*assignment_.time_limit), Blame::kBake};
   }
   if (disconnected_at_ && now - *disconnected_at_ > options_.disconnect_grace) {
-    return std::string("closed its connection without a result");
+    return Fault{"closed its connection without a result"};
   }
   if (now - last_heard_at_ > options_.silence_limit) {
-    return "gave no sign of life for " + in_seconds(options_.silence_limit);
+    return Fault{"gave no sign of life for " + in_seconds(options_.silence_limit)};
   }
   return std::nullopt;
 }
@@ -211,15 +245,26 @@ std::optional<std::string> WorkerRun::overstepped_limit(Clock::time_point now) c
 void WorkerRun::check(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   if (!process_ || !kill_reason_.empty()) return;
-  const std::optional<std::string> reason = overstepped_limit(now);
-  if (!reason) return;
-  kill_reason_ = *reason;
+  const std::optional<Fault> fault = overstepped_limit(now);
+  if (!fault) return;
+  kill_reason_ = fault->reason;
+  blame_ = fault->blame;
   process_->kill_group();
 }
 
 std::string WorkerRun::kill_reason() const {
   const std::lock_guard lock(mutex_);
   return kill_reason_;
+}
+
+WorkerRun::Blame WorkerRun::blame() const {
+  const std::lock_guard lock(mutex_);
+  return blame_;
+}
+
+double WorkerRun::seconds() const {
+  const std::lock_guard lock(mutex_);
+  return std::chrono::duration<double>(Clock::now() - started_at_).count();
 }
 
 }  // namespace radbake::jobs

@@ -33,6 +33,8 @@ class ReadyWorker;
 struct RunEvents {
   std::function<void(const JobProgress&)> on_progress;
   std::function<void(const std::string& tile)> on_tile;
+  std::function<void(const store::CheckpointRecord&)> on_checkpoint;  ///< its blob is stored
+  std::function<void(const std::vector<std::string>& names)> on_drop_checkpoints;
   std::function<void(WorkOutcome)> on_outcome;     ///< at most once
   std::function<void(const WorkerExit&)> on_exit;  ///< once after start() succeeded, last
 };
@@ -46,10 +48,17 @@ class WorkerRun {
     std::string job;
     std::uint32_t attempt = 1;
     bool is_plan = false;
-    store::Work work;
-    std::optional<Clock::duration> time_limit;
-    std::int64_t accepted_unix_ms = 0;  ///< when the job was accepted; 0: it does not matter
-    std::string trace_id;               ///< of the call that asked for it
+    store::Work work = {};
+    std::optional<Clock::duration> time_limit = {};
+    std::int64_t accepted_unix_ms = 0;                      ///< when the job was accepted; 0: it does not matter
+    std::vector<store::CheckpointRecord> checkpoints = {};  ///< of earlier attempts
+    std::string trace_id = {};                              ///< of the call that asked for it
+  };
+  /// Whose fault it is that an attempt ended without an outcome.
+  enum class Blame {
+    kWorker,  ///< died, hung, fell silent: another attempt may do better
+    kBake,    ///< took more than it was allowed to, and would again
+    kServer,  ///< could not keep what it was sent, or stops
   };
 
   WorkerRun(Assignment assignment, const WorkerOptions& options, store::ContentStore& content, RunEvents events);
@@ -63,9 +72,11 @@ class WorkerRun {
   Result<void> greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link);
   void report_progress(const JobProgress& progress);
   void report_tile(const std::string& tile);
+  /// Errors: kInvalidArgument for parts out of order; a disk that refuses ends the attempt.
   Result<void> report_chunk(const ResultChunk& chunk);
   /// Blobs that a result names must be stored: an outcome that names others is a failure.
   void report_outcome(WorkOutcome outcome, const std::vector<Digest>& blobs);
+  void report_dropped_checkpoints(const std::vector<std::string>& names);
   void report_disconnected();
 
   // What the queue decides.
@@ -74,12 +85,15 @@ class WorkerRun {
   void request_finish();
   bool is_cancel_requested() const;
   void accept();
-  void kill(const std::string& reason);
+  void kill(const std::string& reason, Blame blame);
   /// Kills the worker when it has overstepped one of its limits.
   void check(Clock::time_point now);
 
   /// Why the queue or check() killed it; empty if nobody did.
   std::string kill_reason() const;
+  Blame blame() const;
+  /// Since it was started.
+  double seconds() const;
   const Assignment& assignment() const { return assignment_; }
 
  private:
@@ -88,7 +102,13 @@ class WorkerRun {
     std::unique_ptr<store::BlobWriter> writer;
   };
 
-  std::optional<std::string> overstepped_limit(Clock::time_point now) const;
+  struct Fault {
+    std::string reason;
+    Blame blame = Blame::kWorker;
+  };
+  std::optional<Fault> overstepped_limit(Clock::time_point now) const;
+  /// Ends the attempt where the disk, not the worker, is to blame.
+  Result<void> refuse_chunk(const Error& problem);
   /// Starts a process that inherits the inputs; the server's end of its socket.
   Result<store::FileDescriptor> start_process(std::vector<int> inherited);
 
@@ -108,6 +128,7 @@ class WorkerRun {
   std::optional<Clock::time_point> disconnected_at_;
   bool has_outcome_ = false;
   std::string kill_reason_;
+  Blame blame_ = Blame::kWorker;
   GrowingBlob blob_;  // one after the other; touched by the worker's reports only
 
   std::unique_ptr<WorkerProcess> process_;  // set once, by start(), under mutex_

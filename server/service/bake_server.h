@@ -11,6 +11,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/result.h"
+#include "server/jobs/housekeeping.h"
 #include "server/jobs/job_queue.h"
 #include "server/service/admin_server.h"
 #include "server/service/bakes_service.h"
@@ -20,9 +21,9 @@
 #include "server/service/readiness.h"
 #include "server/service/server_service.h"
 #include "server/service/workers_service.h"
-#include "server/store/content_store.h"
 #include "server/store/job_store.h"
 #include "server/store/task_pool.h"
+#include "server/store/tenant_content.h"
 
 namespace radbake::service {
 
@@ -30,7 +31,8 @@ struct BakeServerOptions {
   std::string listen = "127.0.0.1:7419";  ///< host:port (0: any) or unix:PATH
   std::filesystem::path data;             ///< everything that must survive lives here; one server at a time
   std::filesystem::path costs;            ///< what bakes cost on this host; empty: in the data folder
-  jobs::QueueOptions queue;               ///< its max_* and spool folder are set from here
+  jobs::HousekeepingOptions housekeeping;
+  jobs::QueueOptions queue;  ///< its max_* and spool folder are set from here
   Limits limits;
   std::uint32_t max_threads = 0;             ///< of a bake; 0: no bound
   std::string admin_listen;                  ///< host:port (0: any) for /metrics, /livez and /readyz; empty: none
@@ -72,8 +74,9 @@ class BakeServer {
   Readiness readiness_;
 
   store::FileDescriptor lock_;
-  std::unique_ptr<store::ContentStore> content_;
+  std::unique_ptr<store::TenantContent> content_;
   std::unique_ptr<store::JobStore> jobs_;
+  std::unique_ptr<jobs::Housekeeping> housekeeping_;
   std::unique_ptr<jobs::JobQueue> queue_;
   std::unique_ptr<store::TaskPool> pool_;
   std::unique_ptr<CostFile> costs_;

@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::size_t kMaxRequestIdBytes = 128;
 constexpr std::size_t kMaxLabelBytes = 256;
+constexpr std::size_t kMaxClientBytes = 128;
+constexpr int kMaxPriority = 100;
 constexpr std::uint32_t kDefaultPageSize = 100;
 constexpr std::uint32_t kMaxPageSize = 1000;
 
@@ -22,6 +24,20 @@ grpc::Status reply(const Result<std::shared_ptr<jobs::Job>>& job, v1::Bake& bake
   if (!job.ok()) return to_status(job.error(), "max_queued_bakes");
   bake = to_message(**job);
   return grpc::Status::OK;
+}
+
+/// Who turns are shared out between: what the caller calls itself, else its connection.
+std::string client_of(const grpc::CallbackServerContext& context) {
+  const auto& metadata = context.client_metadata();
+  const auto found = metadata.find("radbake-client");
+  if (found == metadata.end()) return context.peer();
+  return {found->second.data(), std::min(found->second.size(), kMaxClientBytes)};
+}
+
+void set_place(const jobs::QueuePlace& place, v1::Bake& bake) {
+  bake.set_queue_position(place.position);
+  bake.set_expected_start_unix_ms(place.expected_start_unix_ms);
+  bake.set_shares(place.shares);
 }
 
 }  // namespace
@@ -39,14 +55,15 @@ grpc::ServerUnaryReactor* BakesService::run_on_pool(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* BakesService::SubmitBake(grpc::CallbackServerContext* context,
                                                    const v1::SubmitBakeRequest* request, v1::Bake* bake) {
   if (request->validate_only()) return validate(context, *request, *bake);
-  return run_on_pool(context,
-                     [this, context, request, bake] { return submit(*request, trace_id_of(*context), *bake); });
+  return run_on_pool(context, [this, context, request, bake] { return submit(*context, *request, *bake); });
 }
 
-grpc::Status BakesService::submit(const v1::SubmitBakeRequest& request, const std::string& trace_id, v1::Bake& bake) {
+grpc::Status BakesService::submit(const grpc::CallbackServerContext& context, const v1::SubmitBakeRequest& request,
+                                  v1::Bake& bake) {
   store::NewJob job;
-  job.trace_id = trace_id;
   std::shared_ptr<jobs::Job> known;
+  job.owner.client = client_of(context);
+  job.owner.trace_id = trace_id_of(context);
   if (auto status = admit(request, job, known); !status.ok()) return status;
   return known ? reply(known, bake) : reply(queue_.submit(job), bake);
 }
@@ -65,7 +82,7 @@ grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* co
       *bake.mutable_manifest() = request.manifest();
       *bake.mutable_settings() = request.settings();
     }
-    reactor->begin(status, job.work, trace_id_of(*context));
+    reactor->begin(status, job.owner.tenant, job.work, trace_id_of(*context));
   });
   return reactor;
 }
@@ -81,9 +98,14 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
                      std::to_string(request.label().size()) + " bytes are above " + std::to_string(kMaxLabelBytes));
   }
   // A request that was accepted once is answered as it was, whatever became of its blobs and of the queue.
+  if (request.priority() < -kMaxPriority || request.priority() > kMaxPriority) {
+    return bad_field("priority", std::to_string(request.priority()) + " is not between -100 and 100");
+  }
+  job.owner.priority = request.priority();
+  job.owner.is_shared = !request.no_cache();
   job.request_id = request.request_id();
   job.body_sha256 = digest_of(request.SerializeAsString()).sha256;
-  const auto found = queue_.find_request(job.request_id, job.body_sha256);
+  const auto found = queue_.find_request(job.owner.tenant, job.request_id, job.body_sha256);
   if (!found.ok()) return to_status(found.error());
   known = *found;
   if (known) return grpc::Status::OK;
@@ -91,8 +113,10 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
     return to_status(room.error(), "min_free_disk_bytes");
   }
 
+  const auto content = content_.of(job.owner.tenant);
+  if (!content.ok()) return to_status(content.error());
   if (auto status = check_scene({request.manifest(), request.settings(), request.run()}, limits_, max_threads_,
-                                content_, job.work);
+                                **content, job.work);
       !status.ok()) {
     return status;
   }
@@ -107,18 +131,25 @@ grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* co
   pool_.post([this, context, request, reactor] {
     store::Work work;
     grpc::Status status = check_protocol(*context);
+    const std::string tenant;
+    const auto content = content_.of(tenant);
+    if (status.ok() && !content.ok()) status = to_status(content.error());
     if (status.ok()) {
-      status = check_scene({request->manifest(), request->settings(), request->run()}, limits_, max_threads_, content_,
+      status = check_scene({request->manifest(), request->settings(), request->run()}, limits_, max_threads_, **content,
                            work);
     }
-    reactor->begin(status, work, trace_id_of(*context));
+    reactor->begin(status, tenant, work, trace_id_of(*context));
   });
   return reactor;
 }
 
 grpc::ServerUnaryReactor* BakesService::GetBake(grpc::CallbackServerContext* context, const v1::GetBakeRequest* request,
                                                 v1::Bake* bake) {
-  return run_on_pool(context, [this, request, bake] { return reply(queue_.find(request->name()), *bake); });
+  return run_on_pool(context, [this, request, bake] {
+    const grpc::Status status = reply(queue_.find(request->name()), *bake);
+    if (status.ok() && bake->state() == v1::QUEUED) set_place(queue_.places()[bake->name()], *bake);
+    return status;
+  });
 }
 
 grpc::ServerUnaryReactor* BakesService::CancelBake(grpc::CallbackServerContext* context,
@@ -151,14 +182,17 @@ grpc::Status BakesService::list(const v1::ListBakesRequest& request, v1::ListBak
     }
   }
   const std::uint32_t page_size = request.page_size() == 0 ? kDefaultPageSize : request.page_size();
-  auto records = queue_.list(page_size + 1, before_id);
+  auto records = queue_.list(std::nullopt, page_size + 1, before_id);
   if (!records.ok()) return to_status(records.error());
   if (records->size() > page_size) {
     records->pop_back();
     response.set_next_page_token(std::to_string(records->back().id));
   }
+  const std::map<std::string, jobs::QueuePlace> places = queue_.places();
   for (const store::JobRecord& record : *records) {
-    *response.add_bakes() = to_message(record, queue_.progress_of(record.name));
+    v1::Bake& bake = *response.add_bakes();
+    bake = to_message(record, queue_.progress_of(record.name));
+    if (const auto place = places.find(record.name); place != places.end()) set_place(place->second, bake);
   }
   return grpc::Status::OK;
 }

@@ -4,8 +4,8 @@
 #include "radbake/v1/bake.grpc.pb.h"
 #include "server/jobs/job_queue.h"
 #include "server/service/disk_watch.h"
-#include "server/store/content_store.h"
 #include "server/store/task_pool.h"
+#include "server/store/tenant_content.h"
 
 namespace radbake::service {
 
@@ -13,7 +13,7 @@ namespace radbake::service {
 class BakesService : public v1::Bakes::CallbackService {
  public:
   /// max_threads: of a bake; 0: as many as it asks for.
-  BakesService(jobs::JobQueue& queue, store::ContentStore& content, store::TaskPool& pool, const DiskWatch& disk,
+  BakesService(jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool, const DiskWatch& disk,
                const Limits& limits, std::uint32_t max_threads)
       : queue_(queue), content_(content), pool_(pool), disk_(disk), limits_(limits), max_threads_(max_threads) {}
 
@@ -33,7 +33,7 @@ class BakesService : public v1::Bakes::CallbackService {
                                                              const v1::WatchBakeRequest* request) override;
 
  private:
-  grpc::Status submit(const v1::SubmitBakeRequest& request, const std::string& trace_id, v1::Bake& bake);
+  grpc::Status submit(const grpc::CallbackServerContext& context, const v1::SubmitBakeRequest& request, v1::Bake& bake);
   /// Checks a submit as far as nothing is queued. known: the bake that the same request created before; then the rest
   /// of the job is not filled in.
   grpc::Status admit(const v1::SubmitBakeRequest& request, store::NewJob& job, std::shared_ptr<jobs::Job>& known);
@@ -46,7 +46,7 @@ class BakesService : public v1::Bakes::CallbackService {
   grpc::ServerUnaryReactor* run_on_pool(grpc::CallbackServerContext* context, Body body);
 
   jobs::JobQueue& queue_;
-  store::ContentStore& content_;
+  store::TenantContent& content_;
   store::TaskPool& pool_;
   const DiskWatch& disk_;
   const Limits limits_;

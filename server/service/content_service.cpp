@@ -24,7 +24,9 @@ grpc::ServerUnaryReactor* ContentService::FindMissing(grpc::CallbackServerContex
         return reactor->Finish(bad_field("digests", valid.error().message));
       }
     }
-    for (const Digest& digest : content_.find_missing(digests)) *response->add_missing() = to_message(digest);
+    const auto content = content_.of("");
+    if (!content.ok()) return reactor->Finish(to_status(content.error()));
+    for (const Digest& digest : (*content)->find_missing(digests)) *response->add_missing() = to_message(digest);
     reactor->Finish(grpc::Status::OK);
   });
   return reactor;
@@ -32,7 +34,7 @@ grpc::ServerUnaryReactor* ContentService::FindMissing(grpc::CallbackServerContex
 
 grpc::ServerReadReactor<v1::UploadChunk>* ContentService::Upload(grpc::CallbackServerContext* context,
                                                                  v1::UploadResult* result) {
-  return new UploadReactor(check_protocol(*context), content_, pool_, disk_, limits_, result);
+  return new UploadReactor(check_protocol(*context), *content_.of("").value(), pool_, disk_, limits_, result);
 }
 
 grpc::ServerUnaryReactor* ContentService::QueryUpload(grpc::CallbackServerContext* context,
@@ -45,7 +47,7 @@ grpc::ServerUnaryReactor* ContentService::QueryUpload(grpc::CallbackServerContex
     if (auto valid = validate_sha256(digest.sha256); !valid.ok()) {
       return reactor->Finish(bad_field("digest", valid.error().message));
     }
-    const store::UploadProgress progress = content_.query_upload(digest);
+    const store::UploadProgress progress = content_.of("").value()->query_upload(digest);
     response->set_committed_bytes(progress.committed_bytes);
     response->set_complete(progress.is_complete);
     reactor->Finish(grpc::Status::OK);
@@ -55,7 +57,7 @@ grpc::ServerUnaryReactor* ContentService::QueryUpload(grpc::CallbackServerContex
 
 grpc::ServerWriteReactor<v1::DownloadChunk>* ContentService::Download(grpc::CallbackServerContext* context,
                                                                       const v1::DownloadRequest* request) {
-  return new DownloadReactor(check_protocol(*context), content_, pool_, limits_.chunk_bytes, *request);
+  return new DownloadReactor(check_protocol(*context), *content_.of("").value(), pool_, limits_.chunk_bytes, *request);
 }
 
 }  // namespace radbake::service

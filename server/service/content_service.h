@@ -3,15 +3,15 @@
 #include "common/base/limits.h"
 #include "radbake/v1/content.grpc.pb.h"
 #include "server/service/disk_watch.h"
-#include "server/store/content_store.h"
 #include "server/store/task_pool.h"
+#include "server/store/tenant_content.h"
 
 namespace radbake::service {
 
 /// radbake.v1.Content over the content store. Everything that touches the disk runs on the pool.
 class ContentService : public v1::Content::CallbackService {
  public:
-  ContentService(store::ContentStore& content, store::TaskPool& pool, const DiskWatch& disk, const Limits& limits)
+  ContentService(store::TenantContent& content, store::TaskPool& pool, const DiskWatch& disk, const Limits& limits)
       : content_(content), pool_(pool), disk_(disk), limits_(limits) {}
 
   grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context, const v1::FindMissingRequest* request,
@@ -24,7 +24,7 @@ class ContentService : public v1::Content::CallbackService {
                                                         const v1::DownloadRequest* request) override;
 
  private:
-  store::ContentStore& content_;
+  store::TenantContent& content_;
   store::TaskPool& pool_;
   const DiskWatch& disk_;
   const Limits limits_;

@@ -78,6 +78,9 @@ v1::Bake to_message(const store::JobRecord& record, const jobs::Job::LatestProgr
   bake.set_finished_unix_ms(record.finished_unix_ms);
   *bake.mutable_manifest() = to_message(record.work.manifest);
   bake.mutable_settings()->ParseFromString(record.work.settings);
+  bake.set_priority(record.owner.priority);
+  bake.set_from_store(record.is_from_store);
+  bake.set_trace_id(record.owner.trace_id);
   if (latest.version > 0) *bake.mutable_progress() = to_message(latest.progress);
   if (!record.result.empty()) bake.mutable_result()->ParseFromString(record.result);
   if (record.error) *bake.mutable_error() = to_message(*record.error);

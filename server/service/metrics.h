@@ -34,11 +34,10 @@ class Metrics : public jobs::JobObserver {
 
   void state_changed(store::JobState from, store::JobState to, double seconds_in_from) override;
   void attempt_ended(jobs::AttemptEnd end) override;
+  void cache_looked_up(bool is_hit) override;
 
   /// A bake whose result was reported.
   void bake_reported(std::uint64_t num_rays, double rays_per_second, std::uint64_t peak_memory_bytes);
-  /// A submit that was, or was not, answered by a bake that is there already.
-  void cache_looked_up(bool is_hit);
 
   void rpc_began(const std::string& method);
   void rpc_ended(const std::string& method, const std::string& code, double seconds);

@@ -78,7 +78,8 @@ grpc::Status ReportReactor::take_report() {
       const v1::ResultBlobChunk& chunk = report_.chunk();
       std::optional<Digest> digest;
       if (chunk.finish()) digest = from_message(chunk.digest());
-      const auto stored = run_->report_chunk({chunk.blob(), chunk.offset(), chunk.data(), digest});
+      const auto stored =
+          run_->report_chunk({chunk.blob(), chunk.offset(), chunk.data(), digest, chunk.is_checkpoint()});
       if (!stored.ok()) run_->report_outcome({Outcome::Kind::kFailed, "", stored.error()}, {});
       break;
     }
@@ -100,6 +101,11 @@ grpc::Status ReportReactor::take_report() {
       run_->report_outcome({Outcome::Kind::kFailed, "", from_message(report_.failed())}, {});
       break;
     case v1::WorkerReport::kCancelled: run_->report_outcome({Outcome::Kind::kCancelled, "", {}}, {}); break;
+    case v1::WorkerReport::kDropCheckpoints: {
+      const auto& names = report_.drop_checkpoints().names();
+      run_->report_dropped_checkpoints({names.begin(), names.end()});
+      break;
+    }
     case v1::WorkerReport::kHello:
     case v1::WorkerReport::KIND_NOT_SET: break;
   }
@@ -121,6 +127,12 @@ v1::WorkerCommand ReportReactor::start_command(const jobs::WorkOrder& order) con
     v1::InputBlob& input = *start.add_inputs();
     *input.mutable_digest() = to_message(file.digest);
     input.set_fd(file.fd);
+  }
+  for (const jobs::CheckpointFile& left : order.checkpoints) {
+    v1::Checkpoint& checkpoint = *start.add_checkpoints();
+    checkpoint.set_name(left.name);
+    *checkpoint.mutable_digest() = to_message(left.file.digest);
+    checkpoint.set_fd(left.file.fd);
   }
   return command;
 }

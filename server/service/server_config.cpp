@@ -75,6 +75,8 @@ void declare_limits(OptionList& options, Limits& limits) {
               "A message that the server receives");
   options.add("--max-digests-per-call", limits.max_digests_per_call, whole_number(1, 10'000), "Digests in FindMissing");
   options.add("--max-blob-bytes", limits.max_blob_bytes, byte_size(kMiB, kTiB), "A mesh, a texture, a layer");
+  options.add("--max-content-bytes", limits.max_content_bytes, byte_size(0, 1024 * kTiB),
+              "All blobs of a tenant, uploads included: what nobody needs makes room; 0: as the disk has");
   options.add("--max-manifest-bytes", limits.max_manifest_bytes, byte_size(kKiB, kGiB),
               "The list of what a scene consists of: the one thing of a client's that the server itself reads");
   options.add("--max-meshes", limits.max_meshes, whole_number(1, 1'000'000), "Meshes of a scene");

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "server/store/failpoint.h"
+
 namespace radbake::store {
 
 Result<std::unique_ptr<BlobWriter>> BlobWriter::create(const std::filesystem::path& temporary) {
@@ -12,11 +14,24 @@ Result<std::unique_ptr<BlobWriter>> BlobWriter::create(const std::filesystem::pa
   return std::unique_ptr<BlobWriter>(new BlobWriter(temporary, std::move(file)));
 }
 
+Result<std::unique_ptr<BlobWriter>> BlobWriter::resume(const std::filesystem::path& temporary) {
+  RADBAKE_ASSIGN_OR_RETURN(FileDescriptor file, open_file(temporary, O_RDWR | O_CREAT));
+  std::unique_ptr<BlobWriter> writer(new BlobWriter(temporary, std::move(file)));
+  constexpr std::uint64_t kPieceBytes = 1 << 20;
+  while (true) {
+    RADBAKE_ASSIGN_OR_RETURN(const std::string piece,
+                             read_range(writer->file_.get(), writer->size_, kPieceBytes, temporary.string()));
+    if (piece.empty()) return writer;
+    writer->hash_.update(std::as_bytes(std::span(piece)));
+    writer->size_ += piece.size();
+  }
+}
+
 BlobWriter::BlobWriter(std::filesystem::path temporary, FileDescriptor file)
     : temporary_(std::move(temporary)), file_(std::move(file)) {}
 
 BlobWriter::~BlobWriter() {
-  if (!is_published_) ::unlink(temporary_.c_str());
+  if (!is_kept_) ::unlink(temporary_.c_str());
 }
 
 Result<void> BlobWriter::append(std::span<const std::byte> bytes) {
@@ -37,9 +52,11 @@ Result<void> BlobWriter::publish(const Digest& expected, const std::filesystem::
                  "the bytes sent for blob " + expected.sha256 + " have the digest " + sha256 + ": send them again"};
   }
   // The bytes must be on the disk before the name is: a name is a promise.
-  RADBAKE_RETURN_IF_ERROR(sync(file_.get(), temporary_.string()));
+  failpoint("blob.written");
+  RADBAKE_RETURN_IF_ERROR(force());
+  failpoint("blob.synced");
   if (std::rename(temporary_.c_str(), name.c_str()) != 0) return system_error("cannot create " + name.string());
-  is_published_ = true;
+  is_kept_ = true;
   return {};
 }
 

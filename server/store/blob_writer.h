@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -17,6 +16,8 @@ namespace radbake::store {
 class BlobWriter {
  public:
   static Result<std::unique_ptr<BlobWriter>> create(const std::filesystem::path& temporary);
+  /// Goes on with what stands in a file, or begins it.
+  static Result<std::unique_ptr<BlobWriter>> resume(const std::filesystem::path& temporary);
   ~BlobWriter();
   BlobWriter(const BlobWriter&) = delete;
   BlobWriter& operator=(const BlobWriter&) = delete;
@@ -25,6 +26,10 @@ class BlobWriter {
 
   /// Appends bytes. After an error the writer is of no more use.
   Result<void> append(std::span<const std::byte> bytes);
+  /// Forces what was written to the disk.
+  Result<void> force() { return sync(file_.get(), temporary_.string()); }
+  /// Leaves the file where it is, for resume().
+  void keep() { is_kept_ = true; }
 
  private:
   friend class ContentStore;
@@ -37,7 +42,7 @@ class BlobWriter {
   FileDescriptor file_;
   Sha256 hash_;
   std::uint64_t size_ = 0;
-  bool is_published_ = false;
+  bool is_kept_ = false;  // under this name or another
 };
 
 }  // namespace radbake::store

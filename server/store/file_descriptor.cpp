@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <system_error>
 
+#include "server/store/failpoint.h"
+
 namespace radbake::store {
 namespace {
 
@@ -26,6 +28,7 @@ Result<FileDescriptor> open_file(const std::filesystem::path& path, int flags) {
 }
 
 Result<void> write_all(int fd, std::span<const std::byte> bytes, std::uint64_t offset, const std::string& name) {
+  if ((errno = fault("write")) != 0) return system_error("cannot write " + name);
   while (!bytes.empty()) {
     const ssize_t written = ::pwrite(fd, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (written < 0 && errno == EINTR) continue;
@@ -51,7 +54,7 @@ Result<std::string> read_range(int fd, std::uint64_t offset, std::uint64_t limit
 }
 
 Result<void> sync(int fd, const std::string& name) {
-  if (::fsync(fd) != 0) return system_error("cannot force " + name + " to the disk");
+  if ((errno = fault("sync")) != 0 || ::fsync(fd) != 0) return system_error("cannot force " + name + " to the disk");
   return {};
 }
 

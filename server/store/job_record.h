@@ -35,14 +35,23 @@ struct Work {
   std::vector<Digest> inputs;  ///< every blob that the worker opens, the manifest among them
 };
 
+/// Whose a job is, and how it is to be treated.
+struct JobOwner {
+  std::string tenant = {};  ///< empty: the server knows no tenants
+  std::string client = {};  ///< turns are shared out between clients: as it calls itself, within its tenant
+  std::string trace_id = {};
+  int priority = 0;       ///< higher: earlier
+  bool is_shared = true;  ///< its run and its result serve every job of the tenant with the same bake key
+};
+
 /// A job before it is accepted.
 struct NewJob {
-  std::string request_id;   ///< the same again: the same job
+  std::string request_id;   ///< the same again, of one tenant: the same job
   std::string body_sha256;  ///< of the request: the same id with another body is refused
   std::string label;
   std::string bake_key;
   Work work;
-  std::string trace_id{};  ///< of the call that submitted it
+  JobOwner owner = {};
 };
 
 /// A job as it is stored.
@@ -51,16 +60,18 @@ struct JobRecord {
   std::string name;     ///< bakes/<16 hexadecimal digits>
   std::string label;
   std::string bake_key;
-  std::string trace_id;  ///< of the call that submitted it, while the server that took it lives
   Work work;
+  JobOwner owner;
   JobState state = JobState::kQueued;
-  std::uint32_t attempt = 1;        ///< the run of a worker that is going on, or the next one
-  std::uint32_t lost_attempts = 0;  ///< how often the server died while the job ran
-  std::uint64_t last_sequence = 0;  ///< of its events
-  std::string result;               ///< bytes of radbake.v1.BakeResult; kSucceeded only
-  std::optional<Error> error;       ///< kFailed only
+  std::uint32_t attempt = 1;          ///< the run of a worker that is going on, or the next one
+  std::uint32_t lost_attempts = 0;    ///< how often the server died while the job ran, since its last checkpoint
+  std::uint32_t failed_attempts = 0;  ///< how often its worker did
+  std::uint64_t last_sequence = 0;    ///< of its events
+  std::string result;                 ///< bytes of radbake.v1.BakeResult; kSucceeded only
+  std::optional<Error> error;         ///< kFailed only
   std::int64_t created_unix_ms = 0;
   std::int64_t finished_unix_ms = 0;  ///< 0: not yet
+  bool is_from_store = false;         ///< its result is that of an earlier job
 };
 
 /// A change of state, never lost and never repeated.
@@ -77,9 +88,18 @@ struct StateChange {
   JobState state = JobState::kQueued;
   std::uint32_t attempt = 1;
   std::uint32_t lost_attempts = 0;
-  std::string message;
-  std::string result;          ///< with kSucceeded
-  std::optional<Error> error;  ///< with kFailed
+  std::string message = {};
+  std::string result = {};           ///< with kSucceeded
+  std::optional<Error> error = {};   ///< with kFailed
+  std::vector<Digest> outputs = {};  ///< with kSucceeded: every blob that the result names
+  bool is_whole = true;              ///< with kSucceeded: false where somebody ended it early
+  std::uint32_t failed_attempts = 0;
+};
+
+/// What an attempt left for the next one.
+struct CheckpointRecord {
+  std::string name;  ///< within its bake
+  Digest digest;
 };
 
 /// A change as it was recorded.

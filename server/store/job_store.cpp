@@ -6,61 +6,27 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "server/store/schema.h"
 
 namespace radbake::store {
 namespace {
-
-// Step k brings a file of user_version k to k + 1. Steps are only ever appended.
-const char* const kMigrations[] = {
-    "CREATE TABLE jobs ("
-    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
-    "  name TEXT NOT NULL UNIQUE,"
-    "  request_id TEXT NOT NULL UNIQUE,"
-    "  body_sha256 TEXT NOT NULL,"
-    "  label TEXT NOT NULL,"
-    "  bake_key TEXT NOT NULL,"
-    "  manifest_sha256 TEXT NOT NULL,"
-    "  manifest_size INTEGER NOT NULL,"
-    "  settings BLOB NOT NULL,"
-    "  run BLOB NOT NULL,"
-    "  state INTEGER NOT NULL,"
-    "  attempt INTEGER NOT NULL,"
-    "  lost_attempts INTEGER NOT NULL,"
-    "  last_sequence INTEGER NOT NULL,"
-    "  result BLOB NOT NULL,"
-    "  error_code INTEGER NOT NULL,"  // -1: none
-    "  error_message TEXT NOT NULL,"
-    "  created_unix_ms INTEGER NOT NULL,"
-    "  finished_unix_ms INTEGER NOT NULL);"
-    "CREATE INDEX jobs_by_state ON jobs(state);"
-    "CREATE INDEX jobs_by_bake_key ON jobs(bake_key);"
-    "CREATE TABLE inputs ("
-    "  job INTEGER NOT NULL REFERENCES jobs(id) ON DELETE CASCADE,"
-    "  position INTEGER NOT NULL,"
-    "  sha256 TEXT NOT NULL,"
-    "  size INTEGER NOT NULL,"
-    "  PRIMARY KEY (job, position)) WITHOUT ROWID;"
-    "CREATE TABLE events ("
-    "  job INTEGER NOT NULL REFERENCES jobs(id) ON DELETE CASCADE,"
-    "  sequence INTEGER NOT NULL,"
-    "  unix_ms INTEGER NOT NULL,"
-    "  state INTEGER NOT NULL,"
-    "  attempt INTEGER NOT NULL,"
-    "  message TEXT NOT NULL,"
-    "  PRIMARY KEY (job, sequence)) WITHOUT ROWID;",
-};
-constexpr std::int64_t kNewestVersion = std::size(kMigrations);
 
 // The numbers of error codes are on disk.
 static_assert(static_cast<int>(ErrorCode::kInvalidArgument) == 0 && static_cast<int>(ErrorCode::kInternal) == 8);
 
 const char* const kColumns =
     "id, name, label, bake_key, manifest_sha256, manifest_size, settings, run, state, attempt, lost_attempts, "
-    "last_sequence, error_code, error_message, created_unix_ms, finished_unix_ms, ";
+    "last_sequence, error_code, error_message, created_unix_ms, finished_unix_ms, tenant, client, trace_id, priority, "
+    "is_shared, is_from_store, failed_attempts, ";
 
 std::int64_t unix_ms_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
       .count();
+}
+
+// Tenants choose their request ids by themselves: equal ones do not meet. No tenant's name has a line's end.
+std::string scoped(const std::string& tenant, const std::string& request_id) {
+  return tenant.empty() ? request_id : tenant + '\n' + request_id;
 }
 
 // Random, so that a name does not tell how many jobs there are, nor comes back after the data folder was emptied.
@@ -74,28 +40,6 @@ std::string new_name() {
     name.push_back(kDigits[byte & 15]);
   }
   return name;
-}
-
-Result<void> migrate(Database& database, const std::filesystem::path& file) {
-  std::int64_t version = 0;
-  {
-    RADBAKE_ASSIGN_OR_RETURN(Statement query, database.prepare("PRAGMA user_version"));
-    auto row = query.step();
-    if (!row.ok()) return row.error();
-    version = query.integer(0);
-  }
-  if (version > kNewestVersion) {
-    return Error{ErrorCode::kFailedPrecondition, "the job database " + file.string() + " has version " +
-                                                     std::to_string(version) + ", this radbaked knows " +
-                                                     std::to_string(kNewestVersion) + ": use a newer radbaked"};
-  }
-  for (; version < kNewestVersion; ++version) {
-    RADBAKE_RETURN_IF_ERROR(database.in_transaction([&]() -> Result<void> {
-      RADBAKE_RETURN_IF_ERROR(database.execute(kMigrations[version]));
-      return database.execute("PRAGMA user_version=" + std::to_string(version + 1));
-    }));
-  }
-  return {};
 }
 
 }  // namespace
@@ -140,7 +84,10 @@ Result<JobRecord> JobStore::read_row(Statement& row) {
   if (row.integer(12) >= 0) job.error = Error{static_cast<ErrorCode>(row.integer(12)), row.bytes(13)};
   job.created_unix_ms = row.integer(14);
   job.finished_unix_ms = row.integer(15);
-  job.result = row.bytes(16);
+  job.owner = {row.bytes(16), row.bytes(17), row.bytes(18), static_cast<int>(row.integer(19)), row.integer(20) != 0};
+  job.is_from_store = row.integer(21) != 0;
+  job.failed_attempts = static_cast<std::uint32_t>(row.integer(22));
+  job.result = row.bytes(23);
   return job;
 }
 
@@ -172,13 +119,14 @@ Result<void> JobStore::insert_event(std::int64_t job, const JobEvent& event) {
   return insert.execute();
 }
 
-Result<std::optional<JobRecord>> JobStore::find_request(const std::string& request_id, const std::string& body_sha256) {
+Result<std::optional<JobRecord>> JobStore::find_request(const std::string& tenant, const std::string& request_id,
+                                                        const std::string& body_sha256) {
   return thread_.run([&]() -> Result<std::optional<JobRecord>> {
     std::string name;
     {
       RADBAKE_ASSIGN_OR_RETURN(Statement row,
                                database_.prepare("SELECT name, body_sha256 FROM jobs WHERE request_id=?"));
-      row.bind_text(1, request_id);
+      row.bind_text(1, scoped(tenant, request_id));
       RADBAKE_ASSIGN_OR_RETURN(const bool has_row, row.step());
       if (!has_row) return std::optional<JobRecord>();
       name = row.bytes(0);
@@ -192,13 +140,14 @@ Result<std::optional<JobRecord>> JobStore::find_request(const std::string& reque
   });
 }
 
-Result<JobRecord> JobStore::create(const NewJob& job) {
+Result<JobRecord> JobStore::create(const NewJob& job, const JobRecord* stored) {
   return thread_.run([&]() -> Result<JobRecord> {
-    const std::string name = new_name();
+    const std::string name = new_name(), request = scoped(job.owner.tenant, job.request_id);
+    const JobState state = stored ? JobState::kSucceeded : JobState::kQueued;
     RADBAKE_RETURN_IF_ERROR(database_.in_transaction([&]() -> Result<void> {
       {
         RADBAKE_ASSIGN_OR_RETURN(Statement known, database_.prepare("SELECT name FROM jobs WHERE request_id=?"));
-        known.bind_text(1, job.request_id);
+        known.bind_text(1, request);
         RADBAKE_ASSIGN_OR_RETURN(const bool is_known, known.step());
         if (is_known) {
           return Error{ErrorCode::kAlreadyExists, "request_id '" + job.request_id + "' was used for " + known.bytes(0)};
@@ -209,12 +158,17 @@ Result<JobRecord> JobStore::create(const NewJob& job) {
           Statement insert,
           database_.prepare("INSERT INTO jobs (name, request_id, body_sha256, label, bake_key, manifest_sha256, "
                             "manifest_size, settings, run, state, attempt, lost_attempts, last_sequence, result, "
-                            "error_code, error_message, created_unix_ms, finished_unix_ms) "
-                            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 1, 0, 1, x'', -1, '', ?, 0)"));
-      insert.bind_text(1, name).bind_text(2, job.request_id).bind_text(3, job.body_sha256).bind_text(4, job.label);
+                            "error_code, error_message, created_unix_ms, finished_unix_ms, tenant, trace_id, "
+                            "priority, is_shared, is_whole, is_from_store, client) "
+                            "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, 1, 0, ?12, ?13, -1, '', ?11, ?14, ?15, "
+                            "?16, ?17, ?18, ?19, ?19, ?20)"));
+      insert.bind_text(1, name).bind_text(2, request).bind_text(3, job.body_sha256).bind_text(4, job.label);
       insert.bind_text(5, job.bake_key).bind_text(6, job.work.manifest.sha256);
       insert.bind(7, static_cast<std::int64_t>(job.work.manifest.size_bytes)).bind_bytes(8, job.work.settings);
-      insert.bind_bytes(9, job.work.run).bind(10, static_cast<int>(JobState::kQueued)).bind(11, now);
+      insert.bind_bytes(9, job.work.run).bind(10, static_cast<int>(state)).bind(11, now).bind(12, stored ? 2 : 1);
+      insert.bind_bytes(13, stored ? stored->result : "").bind(14, stored ? now : 0).bind_text(15, job.owner.tenant);
+      insert.bind_text(16, job.owner.trace_id).bind(17, job.owner.priority).bind(18, job.owner.is_shared ? 1 : 0);
+      insert.bind(19, stored ? 1 : 0).bind_text(20, job.owner.client);
       RADBAKE_RETURN_IF_ERROR(insert.execute());
       const std::int64_t id = database_.last_insert_id();
       for (std::size_t i = 0; i < job.work.inputs.size(); ++i) {
@@ -223,7 +177,13 @@ Result<JobRecord> JobStore::create(const NewJob& job) {
         input.bind(4, static_cast<std::int64_t>(job.work.inputs[i].size_bytes));
         RADBAKE_RETURN_IF_ERROR(input.execute());
       }
-      return insert_event(id, {1, now, JobState::kQueued, 1, "queued"});
+      RADBAKE_RETURN_IF_ERROR(insert_event(id, {1, now, JobState::kQueued, 1, "queued"}));
+      if (!stored) return {};
+      RADBAKE_RETURN_IF_ERROR(insert_event(id, {2, now, state, 1, "the result of " + stored->name}));
+      RADBAKE_ASSIGN_OR_RETURN(
+          Statement outputs, database_.prepare("INSERT INTO outputs SELECT ?, sha256, size FROM outputs WHERE job=?"));
+      outputs.bind(1, id).bind(2, stored->id);
+      return outputs.execute();
     }));
     return read_job("name=?", name);
   });
@@ -238,14 +198,18 @@ Result<RecordedChange> JobStore::append_event(const std::string& name, const Sta
       RADBAKE_ASSIGN_OR_RETURN(
           Statement update,
           database_.prepare("UPDATE jobs SET state=?, attempt=?, lost_attempts=?, last_sequence=?, result=?, "
-                            "error_code=?, error_message=?, finished_unix_ms=? WHERE id=?"));
+                            "error_code=?, error_message=?, finished_unix_ms=?, is_whole=?, failed_attempts=? "
+                            "WHERE id=?"));
       update.bind(1, static_cast<int>(change.state)).bind(2, change.attempt).bind(3, change.lost_attempts);
       update.bind(4, static_cast<std::int64_t>(recorded.event.sequence)).bind_bytes(5, change.result);
       update.bind(6, change.error ? static_cast<int>(change.error->code) : -1);
       update.bind_text(7, change.error ? change.error->message : "");
-      update.bind(8, is_terminal(change.state) ? recorded.event.unix_ms : 0).bind(9, job.id);
+      update.bind(8, is_terminal(change.state) ? recorded.event.unix_ms : 0);
+      update.bind(9, change.state == JobState::kSucceeded && change.is_whole ? 1 : 0).bind(10, change.failed_attempts);
+      update.bind(11, job.id);
       RADBAKE_RETURN_IF_ERROR(update.execute());
       RADBAKE_RETURN_IF_ERROR(insert_event(job.id, recorded.event));
+      RADBAKE_RETURN_IF_ERROR(insert_outputs(job.id, change.outputs));
       RADBAKE_ASSIGN_OR_RETURN(recorded.record, read_job("name=?", name));
       return {};
     }));
@@ -275,12 +239,14 @@ Result<std::vector<JobEvent>> JobStore::events_after(const std::string& name, st
   });
 }
 
-Result<std::vector<JobRecord>> JobStore::list(std::uint32_t num_jobs, std::int64_t before_id) {
+Result<std::vector<JobRecord>> JobStore::list(const std::optional<std::string>& tenant, std::uint32_t num_jobs,
+                                              std::int64_t before_id) {
   return thread_.run([&]() -> Result<std::vector<JobRecord>> {
     RADBAKE_ASSIGN_OR_RETURN(Statement rows,
                              database_.prepare(std::string("SELECT ") + kColumns +
-                                               "x'' FROM jobs WHERE ?1=0 OR id<?1 ORDER BY id DESC LIMIT ?2"));
-    rows.bind(1, before_id).bind(2, num_jobs);
+                                               "x'' FROM jobs WHERE (?1=0 OR id<?1) AND (?3=0 OR tenant=?4) "
+                                               "ORDER BY id DESC LIMIT ?2"));
+    rows.bind(1, before_id).bind(2, num_jobs).bind(3, tenant ? 1 : 0).bind_text(4, tenant.value_or(""));
     std::vector<JobRecord> jobs;
     while (true) {
       RADBAKE_ASSIGN_OR_RETURN(const bool has_row, rows.step());

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "common/base/result.h"
+#include "server/store/failpoint.h"
 
 namespace radbake::store {
 
@@ -45,6 +46,8 @@ class Database {
   /// Runs statements without values or rows.
   Result<void> execute(const std::string& sql);
   Result<Statement> prepare(const std::string& sql);
+  /// Rows that the last statement changed.
+  int num_changed() const { return sqlite3_changes(database_.get()); }
   std::int64_t last_insert_id() const { return sqlite3_last_insert_rowid(database_.get()); }
 
   /// Runs `body` in one transaction: all of it, or on an error nothing.
@@ -52,7 +55,10 @@ class Database {
   Result<void> in_transaction(Body body) {
     RADBAKE_RETURN_IF_ERROR(execute("BEGIN IMMEDIATE"));
     Result<void> done = body();
+    failpoint("database.changed");
+    if (fault("commit") != 0) done = Error{ErrorCode::kResourceExhausted, "job database: database or disk is full"};
     if (done.ok()) done = execute("COMMIT");
+    failpoint("database.committed");
     if (!done.ok()) (void)execute("ROLLBACK").ok();
     return done;
   }

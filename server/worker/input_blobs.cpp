@@ -15,6 +15,12 @@ InputBlobs::InputBlobs(const v1::StartWork& start, const std::vector<int>& hande
     descriptors_.emplace(Digest{input.digest().sha256(), input.digest().size_bytes()},
                          index < handed.size() ? handed[index] : input.fd());
   }
+  for (int i = 0; i < start.checkpoints_size(); ++i) {
+    const v1::Checkpoint& checkpoint = start.checkpoints(i);
+    const auto index = static_cast<std::size_t>(start.inputs_size() + i);
+    descriptors_.emplace(Digest{checkpoint.digest().sha256(), checkpoint.digest().size_bytes()},
+                         index < handed.size() ? handed[index] : checkpoint.fd());
+  }
 }
 
 Result<std::string> InputBlobs::read(const Digest& digest) const {

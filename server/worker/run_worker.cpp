@@ -21,7 +21,9 @@
 #include "server/worker/input_blobs.h"
 #include "server/worker/report_stream.h"
 #include "server/worker/result_messages.h"
+#include "server/worker/send_blob.h"
 #include "server/worker/status_message.h"
+#include "server/worker/stream_checkpoints.h"
 
 namespace radbake::worker {
 namespace {
@@ -58,8 +60,7 @@ class StreamObserver : public radiosity::BakeObserver {
 };
 
 /// Decodes the scene of an order.
-Result<Scene> read_scene(const v1::StartWork& start, const WorkerIdentity& identity) {
-  const InputBlobs inputs(start, identity.inputs);
+Result<Scene> read_scene(const v1::StartWork& start, const InputBlobs& inputs) {
   const Digest manifest{start.manifest().sha256(), start.manifest().size_bytes()};
   if (manifest.size_bytes > start.limits().max_manifest_bytes()) {
     return Error{ErrorCode::kResourceExhausted, "the scene manifest has " + std::to_string(manifest.size_bytes) +
@@ -73,34 +74,6 @@ Result<Scene> read_scene(const v1::StartWork& start, const WorkerIdentity& ident
 
 std::uint64_t chunk_bytes_of(const v1::Limits& limits) {
   return limits.chunk_bytes() > 0 ? limits.chunk_bytes() : Limits{}.chunk_bytes;
-}
-
-Error server_gone() { return {ErrorCode::kUnavailable, "the server is gone"}; }
-
-/// Sends a blob in parts, and returns its digest.
-Result<v1::Digest> send_blob(const std::string& name, std::span<const std::byte> bytes, std::uint64_t chunk_bytes,
-                             ReportStream& stream, const std::function<void(std::uint64_t)>& on_sent) {
-  const Digest digest = digest_of(bytes);
-  v1::Digest message;
-  message.set_sha256(digest.sha256);
-  message.set_size_bytes(digest.size_bytes);
-  std::uint64_t offset = 0;
-  do {
-    const auto part = bytes.subspan(offset, std::min<std::uint64_t>(chunk_bytes, bytes.size() - offset));
-    v1::WorkerReport report;
-    v1::ResultBlobChunk& chunk = *report.mutable_chunk();
-    chunk.set_blob(name);
-    chunk.set_offset(offset);
-    chunk.set_data(part.data(), part.size());
-    offset += part.size();
-    if (offset == bytes.size()) {
-      chunk.set_finish(true);
-      *chunk.mutable_digest() = message;
-    }
-    if (!stream.send(std::move(report))) return server_gone();
-    on_sent(part.size());
-  } while (offset < bytes.size());
-  return message;
 }
 
 /// Sends all layers and the meshes' data, under the state WRITING.
@@ -128,12 +101,14 @@ Result<v1::BakeResult> send_result(const radiosity::BakeOutcome& outcome, v1::Pr
   for (const radiosity::Layer& layer : outcome.layers) {
     v1::Layer& message = *result.add_layers();
     message = to_message(layer);
-    RADBAKE_ASSIGN_OR_RETURN(*message.mutable_blob(), send_blob(layer.name, std::as_bytes(std::span(layer.values)),
-                                                                chunk_bytes, stream, report_sent));
+    RADBAKE_ASSIGN_OR_RETURN(*message.mutable_blob(),
+                             send_blob(layer.name, BlobUse::kResult, std::as_bytes(std::span(layer.values)),
+                                       chunk_bytes, stream, report_sent));
   }
   if (!mesh_data.empty()) {
-    RADBAKE_ASSIGN_OR_RETURN(*result.mutable_mesh_data(), send_blob("mesh_data", std::as_bytes(std::span(mesh_data)),
-                                                                    chunk_bytes, stream, report_sent));
+    RADBAKE_ASSIGN_OR_RETURN(*result.mutable_mesh_data(),
+                             send_blob("mesh_data", BlobUse::kResult, std::as_bytes(std::span(mesh_data)), chunk_bytes,
+                                       stream, report_sent));
   }
   return result;
 }
@@ -144,8 +119,8 @@ radiosity::BakeOptions options_of(const v1::StartWork& start) {
   return options;
 }
 
-Result<v1::WorkerReport> plan(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
-  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start, identity));
+Result<v1::WorkerReport> plan(const v1::StartWork& start, const InputBlobs& inputs, ReportStream& stream) {
+  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start, inputs));
   RADBAKE_ASSIGN_OR_RETURN(const radiosity::PlannedBake planned,
                            radiosity::plan_scene(scene, options_of(start), stream.stop_token()));
   v1::WorkerReport report;
@@ -154,11 +129,12 @@ Result<v1::WorkerReport> plan(const v1::StartWork& start, const WorkerIdentity& 
   return report;
 }
 
-Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
+Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& identity, const InputBlobs& inputs,
+                              ReportStream& stream) {
   const auto began_at = Clock::now();
   StageClock before, after;
   before.begin("decoding");
-  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start, identity));
+  RADBAKE_ASSIGN_OR_RETURN(const Scene scene, read_scene(start, inputs));
   before.end();
 
   radiosity::BakeOptions options = options_of(start);
@@ -168,9 +144,11 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
         std::max(kLeastBudgetSeconds, options.time_budget_seconds - start.waited_seconds() - seconds_since(began_at));
   }
   StreamObserver observer(stream);
+  StreamCheckpoints checkpoints(start, inputs, chunk_bytes_of(start.limits()), stream);
   const auto bake_began_at = Clock::now();
-  RADBAKE_ASSIGN_OR_RETURN(const radiosity::BakeOutcome outcome,
-                           radiosity::bake_scene(scene, options, observer, stream.stop_token(), stream.finish_token()));
+  RADBAKE_ASSIGN_OR_RETURN(
+      const radiosity::BakeOutcome outcome,
+      radiosity::bake_scene(scene, options, observer, stream.stop_token(), stream.finish_token(), &checkpoints));
   const double bake_seconds = seconds_since(bake_began_at);
 
   after.begin("writing");
@@ -207,7 +185,8 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
 /// Does the work; nothing that it throws gets further.
 Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
   try {
-    return start.plan_only() ? plan(start, identity, stream) : bake(start, identity, stream);
+    const InputBlobs inputs(start, identity.inputs);
+    return start.plan_only() ? plan(start, inputs, stream) : bake(start, identity, inputs, stream);
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kResourceExhausted, "the bake needs more memory than its worker may use"};
   } catch (const std::exception& exception) {

@@ -89,7 +89,7 @@ TEST_F(MetricsTest, CountsABakeItsStagesAndItsRays) {
 
 TEST_F(MetricsTest, CountsWorkersThatDieAndBakesThatWereCancelled) {
   EXPECT_EQ(client_.watch(client_.submit(kCrash).name()).finished().state(), v1::FAILED);
-  EXPECT_TRUE(becomes("radbake_attempts_ended_total{reason=\"worker_died\"}", 1));
+  EXPECT_TRUE(becomes("radbake_attempts_ended_total{reason=\"worker_died\"}", 3));
   EXPECT_TRUE(becomes("radbake_bakes_ended_total{state=\"failed\"}", 1));
   const std::string stubborn = client_.submit(kIgnoreCancel).name();
   client_.wait_for(stubborn, v1::FORM_FACTORS);

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
+#include <string>
 
+#include "common/base/archive.h"
 #include "server/radiosity/bake/lightmap_layers.h"
 #include "server/radiosity/bake/on_threads.h"
 #include "server/radiosity/bake/pass_runner.h"
@@ -20,10 +23,41 @@ namespace {
 
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
+/// What the passes have written into a report.
+template <typename Archive>
+void keep_report(Archive& archive, BakeReport& report) {
+  for (auto* count : {&report.num_patches, &report.num_row_rays, &report.num_gather_rays, &report.num_light_rays}) {
+    archive(*count);
+  }
+  SolverSummary& solver = report.solver;
+  archive(solver.solver);
+  archive(solver.status);
+  archive(solver.sweeps);
+  for (double* value : {&solver.residual, &solver.error_bound, &solver.relative_error_bound, &solver.tolerance}) {
+    archive(*value);
+  }
+  archive(solver.history);
+  archive(report.energy);
+  archive(report.transport);
+  archive(report.error.limited_by);
+  archive(report.error.predicted);
+  archive(report.passes);
+  auto num_warnings = static_cast<std::uint64_t>(report.warnings.size());
+  archive(num_warnings);
+  // Each has at least its two lengths.
+  if (!archive.can_hold(num_warnings, 2 * sizeof(std::uint64_t))) return;
+  report.warnings.resize(num_warnings);
+  for (Warning& warning : report.warnings) {
+    archive(warning.id);
+    archive(warning.text);
+  }
+}
+
 /// One bake, pass after pass, on the threads of the arena that it runs in.
 class Bake {
  public:
-  Bake(const Scene& scene, Preparation& prepared, ProgressMeter& progress, std::stop_token stop, std::stop_token finish)
+  Bake(const Scene& scene, Preparation& prepared, ProgressMeter& progress, std::stop_token stop, std::stop_token finish,
+       Checkpoints* checkpoints)
       : scene_(scene),
         options_(prepared.options),
         prepared_(prepared),
@@ -31,15 +65,35 @@ class Bake {
         progress_(progress),
         stop_(stop),
         finish_(finish),
-        passes_(prepared, progress, stop, finish, [this] { return is_over(); }) {}
-
-  Result<BakeOutcome> run() {
+        checkpoints_(checkpoints),
+        passes_(
+            prepared, progress, stop, finish, [this] { return is_over(); }, checkpoints),
+        num_first_patches_(prepared.patches.size()) {
     BakeReport& report = outcome_.report;
     report.plan = prepared_.plan;
     report.warnings = prepared_.plan.warnings;
     report.num_patches = prepared_.patches.size();
     report.instruction_set = prepared_.visibility->instruction_set();
+  }
 
+  /// Takes up the passes that an earlier attempt kept, where there are any. False: they do not fit, and this object is
+  /// of no more use.
+  bool resume() {
+    const std::optional<std::string> bytes = checkpoints_ != nullptr ? checkpoints_->load(kPassName) : std::nullopt;
+    if (!bytes) return true;
+    ArchiveReader archive(*bytes);
+    std::string theirs;
+    archive(theirs);
+    if (theirs != fingerprint()) return true;
+    double edge = prepared_.patch_edge;
+    keep(archive, edge);
+    if (!archive.is_at_end()) return false;
+    passes_.take_patches(edge, max_refined_patches());
+    return true;
+  }
+
+  Result<BakeOutcome> run() {
+    BakeReport& report = outcome_.report;
     if (is_progressive()) {
       RADBAKE_RETURN_IF_ERROR(refine());
     } else {
@@ -58,9 +112,10 @@ class Bake {
     // A first pass is a third of a bake, or so: nobody knows before it has told its error.
     constexpr double kFirstShare = 0.3;
     const std::vector<PassScale>& replay = options_.replay;
-    const PassScale first = replay.empty() ? first_scale() : replay.front();
-    const std::size_t num_first_patches = prepared_.patches.size();
-    RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(first), first, kFirstShare));
+    if (results_.num_passes == 0) {
+      const PassScale first = replay.empty() ? first_scale() : replay.front();
+      RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(first), first, kFirstShare));
+    }
     for (;;) {
       results_.seconds_left =
           options_.time_budget_seconds > 0
@@ -86,7 +141,7 @@ class Bake {
           passes_.stop_interpolating_above(next.scale.interpolation_limit * mean_irradiance_);
         }
         if (next.scale.refines_patches) refine_patches();
-        const double growth = static_cast<double>(prepared_.patches.size()) / static_cast<double>(num_first_patches);
+        const double growth = static_cast<double>(prepared_.patches.size()) / static_cast<double>(num_first_patches_);
         RADBAKE_RETURN_IF_ERROR(run_pass(pass_of(next.scale, growth), next.scale, next.share_of_rest));
       }
       if (finish_.stop_requested() || has_ended_early_) {
@@ -210,7 +265,38 @@ class Bake {
     summary.cpu_seconds = progress_.cpu_seconds();
     outcome_.report.passes.push_back(summary);
     progress_.end_pass(error.relative_rmse, error.low, error.high);
+    if (!has_ended_early_ && is_progressive()) keep_pass();
     return {};
+  }
+
+  /// Of what the passes depend on, for one scene, set of options and build.
+  std::string fingerprint() const {
+    return "radpass01 " + outcome_.report.instruction_set + ' ' + std::to_string(num_first_patches_);
+  }
+
+  /// Where the passes stand.
+  template <typename Archive>
+  void keep(Archive& archive, double& patch_edge) {
+    archive(patch_edge);
+    archive(results_);
+    archive(mean_irradiance_);
+    keep_report(archive, outcome_.report);
+    passes_.keep(archive);
+  }
+
+  void keep_pass() {
+    if (checkpoints_ == nullptr || progress_.seconds() - kept_at_ < checkpoints_->interval()) return;
+    ArchiveWriter archive;
+    archive(fingerprint());
+    keep(archive, prepared_.patch_edge);
+    checkpoints_->save(kPassName, archive.take());
+    // The rows of this pass and of those before it have served.
+    std::vector<std::string> names;
+    for (std::string& name : checkpoints_->names()) {
+      if (name.starts_with("rows/")) names.push_back(std::move(name));
+    }
+    if (!names.empty()) checkpoints_->drop(names);
+    kept_at_ = progress_.seconds();
   }
 
   /// Fills and levels what the passes found, and tells what it is off by.
@@ -278,8 +364,13 @@ class Bake {
   Preparation& prepared_;
   const Surfaces& surfaces_;
   ProgressMeter& progress_;
+  static constexpr const char* kPassName = "pass";
+
   std::stop_token stop_, finish_;
+  Checkpoints* const checkpoints_;
   PassRunner passes_;
+  const std::size_t num_first_patches_;
+  double kept_at_ = 0;  ///< seconds since the bake began
   bool has_ended_early_ = false;
   PassResults results_;
   double mean_irradiance_ = 0;  ///< of the map so far, lx
@@ -289,7 +380,7 @@ class Bake {
 }  // namespace
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
-                               std::stop_token stop, std::stop_token finish) {
+                               std::stop_token stop, std::stop_token finish, Checkpoints* checkpoints) {
   return on_threads(options.threads, [&]() -> Result<BakeOutcome> {
     const ProgressMeter::Start start;
     observer.on_progress({});
@@ -298,7 +389,9 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
     if (!asks_for_result(options))
       prediction = predict_bake(*prepared, process_cpu_seconds() - start.cpu_seconds, stop);
     ProgressMeter progress(observer, start, options.max_error);
-    auto outcome = Bake(scene, *prepared, progress, stop, finish).run();
+    auto bake = std::make_unique<Bake>(scene, *prepared, progress, stop, finish, checkpoints);
+    if (!bake->resume()) bake = std::make_unique<Bake>(scene, *prepared, progress, stop, finish, checkpoints);
+    auto outcome = bake->run();
     if (!outcome.ok()) return outcome;
     outcome->report.prediction = prediction;
     // Small passes take more by the ray than what is predicted by these.

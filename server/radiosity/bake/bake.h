@@ -7,6 +7,7 @@
 
 #include "common/base/result.h"
 #include "common/scene/scene.h"
+#include "server/radiosity/bake/checkpoints.h"
 #include "server/radiosity/gather/mesh_output.h"
 #include "server/radiosity/plan/plan.h"
 #include "server/radiosity/plan/prediction.h"
@@ -179,7 +180,10 @@ Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, s
 /// Units:  metres, nit, cd, lx in; irradiance in lx out.
 /// Errors: as plan_scene; kCancelled when stop was requested; kInternal when the solver did not converge.
 /// `finish`, when requested, ends the bake with the best that it has: at the end of the first pass, or at once later.
+/// `checkpoints`: where to keep, and find, what another attempt goes on from; null: nowhere. A bake that goes on tells
+/// the seconds of its own attempt.
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
-                               std::stop_token stop = {}, std::stop_token finish = {});
+                               std::stop_token stop = {}, std::stop_token finish = {},
+                               Checkpoints* checkpoints = nullptr);
 
 }  // namespace radbake::radiosity

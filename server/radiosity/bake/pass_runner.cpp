@@ -13,19 +13,23 @@ enum Purpose : std::uint64_t { kReplicate = 71, kPass = 72 };
 /// Where texels adapt, the most shadow rays one gets, over the mean.
 constexpr int kMostLightSamples = 16;
 
+/// Of the names of all rows of a pass.
+std::string rows_prefix(int pass) { return "rows/" + std::to_string(pass) + '/'; }
+
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
 
 }  // namespace
 
 PassRunner::PassRunner(Preparation& prepared, ProgressMeter& progress, std::stop_token stop, std::stop_token finish,
-                       std::function<bool()> is_over)
+                       std::function<bool()> is_over, Checkpoints* checkpoints)
     : prepared_(prepared),
       options_(prepared.options),
       surfaces_(prepared.surveyed.surfaces),
       progress_(progress),
       stop_(std::move(stop)),
       finish_(std::move(finish)),
-      is_over_(std::move(is_over)) {
+      is_over_(std::move(is_over)),
+      checkpoints_(checkpoints) {
   if (prepared.atlas) {
     lightmaps_.emplace(surfaces_, *prepared.atlas, prepared.shadows(), prepared.plan.spacing,
                        options_.wants_direct || options_.wants_indirect, options_.wants_ao);
@@ -50,14 +54,18 @@ Result<std::optional<PassRunner::Rays>> PassRunner::run(const Pass& pass, BakeRe
       Rays{of_rows + static_cast<double>(counts.num_rays), static_cast<double>(counts.num_light_rays)});
 }
 
-/// Patches half as long a side, and nothing gathered from the larger ones.
 void PassRunner::refine_patches(std::size_t max_patches) {
-  prepared_.patch_edge /= 2;
+  take_patches(prepared_.patch_edge / 2, max_patches);
+  if (lightmaps_) lightmaps_->forget_gathered();
+  if (vertices_) vertices_->forget_gathered();
+}
+
+void PassRunner::take_patches(double edge, std::size_t max_patches) {
+  if (edge == prepared_.patch_edge) return;
+  prepared_.patch_edge = edge;
   prepared_.patches = make_patches(surfaces_, *prepared_.visibility, {prepared_.patch_edge, max_patches, stop_});
   prepared_.reached_backs = find_reached_backs(surfaces_, prepared_.patches, *prepared_.visibility, stop_);
   twice_as_large_.clear();
-  if (lightmaps_) lightmaps_->forget_gathered();
-  if (vertices_) vertices_->forget_gathered();
 }
 
 LightError PassRunner::error() const {
@@ -82,8 +90,12 @@ Result<std::vector<PatchLight>> PassRunner::solve_replicates(const Pass& pass, s
   std::vector<ReplicateSystem> systems;
   for (int r = 0; r < num; ++r) {
     const auto index = static_cast<std::uint64_t>(r);
-    const SystemSettings own{seed_of(seed, kReplicate, index), settings.rays_per_row / num,
-                             settings.patch_light_samples / num, pass.tolerance};
+    const SystemSettings own{seed_of(seed, kReplicate, index),
+                             settings.rays_per_row / num,
+                             settings.patch_light_samples / num,
+                             pass.tolerance,
+                             checkpoints_,
+                             rows_prefix(pass.index) + std::to_string(r) + '/'};
     const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
       progress_.report(BakeStage::kFormFactors, total * index + done, total * total_num);
       if (!is_first && is_over_()) end.request_stop();

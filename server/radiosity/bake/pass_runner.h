@@ -8,6 +8,7 @@
 
 #include "common/base/result.h"
 #include "server/radiosity/bake/bake.h"
+#include "server/radiosity/bake/checkpoints.h"
 #include "server/radiosity/bake/patch_light.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/bake/progress_meter.h"
@@ -23,8 +24,9 @@ namespace radbake::radiosity {
 class PassRunner {
  public:
   /// `is_over`, asked from any thread: whether a pass but the first is to end with what it has.
+  /// `checkpoints`: null, or where rows are kept.
   PassRunner(Preparation& prepared, ProgressMeter& progress, std::stop_token stop, std::stop_token finish,
-             std::function<bool()> is_over);
+             std::function<bool()> is_over, Checkpoints* checkpoints);
 
   struct Pass {
     int index = 0;
@@ -50,6 +52,17 @@ class PassRunner {
     if (lightmaps_) lightmaps_->stop_interpolating_above(limit);
   }
 
+  /// Patches of a length a side, where they are not: as an earlier attempt left them.
+  void take_patches(double edge, std::size_t max_patches);
+
+  /// What the passes add up to, but for the patches.
+  template <typename Archive>
+  void keep(Archive& archive) {
+    archive(error_bound_);
+    if (lightmaps_) lightmaps_->keep(archive);
+    if (vertices_) vertices_->keep(archive);
+  }
+
   LightError error() const;
   const std::optional<LightmapGather>& lightmaps() const { return lightmaps_; }
   const std::optional<VertexGather>& vertices() const { return vertices_; }
@@ -68,6 +81,7 @@ class PassRunner {
   ProgressMeter& progress_;
   std::stop_token stop_, finish_;
   std::function<bool()> is_over_;
+  Checkpoints* const checkpoints_;
   std::optional<LightmapGather> lightmaps_;
   std::optional<VertexGather> vertices_;
   std::vector<std::uint32_t> twice_as_large_;  ///< [patches]

@@ -1,10 +1,12 @@
 #include "server/radiosity/bake/radiosity_system.h"
 
 #include <algorithm>
+#include <functional>
 #include <numbers>
 #include <sstream>
 #include <string>
 
+#include "server/radiosity/bake/row_checkpoint.h"
 #include "server/radiosity/form_factor/adaptive.h"
 #include "server/radiosity/form_factor/analytic_rows.h"
 #include "server/radiosity/form_factor/hemicube_rows.h"
@@ -35,12 +37,6 @@ std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, in
 }
 
 namespace {
-
-struct TakenRow {
-  FormFactorRow row;  ///< without entries where they are not kept
-  PatchSample sample;
-  std::uint32_t length = 0;
-};
 
 /// The light on each patch and what it does with it.
 void fill_light(const std::vector<TakenRow>& rows, Vec3 sky, RadiositySystem& system) {
@@ -211,6 +207,14 @@ std::unique_ptr<TransportOperator> make_streamed(const EstimatedRows& rows, cons
       std::move(sums), source, reads_columns(solver) ? StreamedSystem::kByColumns : StreamedSystem::kByRows);
 }
 
+/// Of all that the rows of a system depend on, for one scene, set of options and build.
+std::uint64_t fingerprint_of(const Preparation& prepared, const SystemSettings& settings, int channel) {
+  std::ostringstream text;
+  text << prepared.visibility->instruction_set() << ' ' << prepared.patches.size() << ' ' << prepared.patch_edge << ' '
+       << settings.seed << ' ' << settings.rays_per_row << ' ' << settings.light_samples << ' ' << channel;
+  return std::hash<std::string>{}(text.str());
+}
+
 }  // namespace
 
 Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
@@ -232,6 +236,10 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
   // Estimate the rows, and the light on each patch.
   const bool is_streamed = prepared.plan.transport == Transport::kStreamed;
   std::vector<TakenRow> rows(patches.size());
+  // Rows whose entries are not there cannot be gone on from.
+  RowCheckpoint checkpoint(is_streamed ? nullptr : settings.checkpoints,
+                           settings.checkpoint_prefix + std::to_string(channel) + '/',
+                           fingerprint_of(prepared, settings, channel), rows);
   sample_patches(
       *system->sampler, patches.num_cells(), prepared.reached_backs,
       [&](std::uint32_t patch, FormFactorRow& row, const PatchSample& sample) {
@@ -239,8 +247,10 @@ Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
         if (is_streamed) row.entries.clear();
         rows[patch].row = row;  // a copy is no longer than it need be
         rows[patch].sample = sample;
+        checkpoint.add(patch);
       },
-      on_row, stop);
+      on_row, stop,
+      [&](std::uint32_t patch) { return checkpoint.is_known(patch) ? &rows[patch].row.entries : nullptr; });
   if (stop.stop_requested()) return Error{ErrorCode::kCancelled, "the bake was cancelled"};
   fill_light(rows, surfaces.sky, *system);
   agree_on_holes(patches, rows);

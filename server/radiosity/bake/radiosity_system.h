@@ -4,10 +4,12 @@
 #include <functional>
 #include <memory>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "server/radiosity/bake/bake.h"
+#include "server/radiosity/bake/checkpoints.h"
 #include "server/radiosity/bake/preparation.h"
 #include "server/radiosity/form_factor/patch_rows.h"
 #include "server/radiosity/solve/solve.h"
@@ -40,6 +42,8 @@ struct SystemSettings {
   int light_samples = 0;  ///< shadow rays to emitters, a patch
   /// How far off row sums and the solution may be left, relative; 0: as little as can be.
   double tolerance = 0;
+  Checkpoints* checkpoints = nullptr;  ///< null: none
+  std::string checkpoint_prefix = {};  ///< of the names of its rows
 };
 
 /// The estimator of a plan's rows, as a channel of what is see-through meets the scene.

@@ -171,7 +171,8 @@ std::vector<std::uint8_t> find_reached_backs(const Surfaces& surfaces, const Pat
 
 void sample_patches(const PatchSampler& sampler, std::size_t num_fronts, std::span<const std::uint8_t> reached,
                     const std::function<void(std::uint32_t, FormFactorRow&, const PatchSample&)>& take,
-                    const std::function<void(std::uint64_t, std::uint64_t)>& on_row, const std::stop_token& stop) {
+                    const std::function<void(std::uint64_t, std::uint64_t)>& on_row, const std::stop_token& stop,
+                    const std::function<const std::vector<FormFactorRow::Entry>*(std::uint32_t)>& known) {
   std::vector<std::atomic<std::uint8_t>> is_met(sampler.size());
   // First all fronts and the reached backs; then, wave by wave, the backs that the last wave's rows have met.
   std::vector<std::uint32_t> wave(num_fronts);
@@ -190,12 +191,15 @@ void sample_patches(const PatchSampler& sampler, std::size_t num_fronts, std::sp
       FormFactorRow row;
       for (std::size_t k = begin; k < end; ++k) {
         if (stop.stop_requested()) return;
-        sampler.sample_row(wave[k], scratch, stop, row);
-        if (stop.stop_requested()) return;
-        for (const FormFactorRow::Entry& entry : row.entries) {
-          is_met[entry.patch].store(1, std::memory_order_relaxed);
+        const auto* entries = known ? known(wave[k]) : nullptr;
+        const bool is_new = entries == nullptr;
+        if (is_new) {
+          sampler.sample_row(wave[k], scratch, stop, row);
+          if (stop.stop_requested()) return;
+          entries = &row.entries;
         }
-        take(wave[k], row, sampler.sample_light(wave[k], scratch));
+        for (const FormFactorRow::Entry& entry : *entries) is_met[entry.patch].store(1, std::memory_order_relaxed);
+        if (is_new) take(wave[k], row, sampler.sample_light(wave[k], scratch));
         const std::uint64_t now = ++done;
         if (on_row) on_row(now, total);
       }

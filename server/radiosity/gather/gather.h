@@ -100,6 +100,16 @@ class LightmapGather {
   double mean_irradiance() const;
   double relative_spread() const { return spread_.relative(); }
 
+  /// Between passes.
+  template <typename Archive>
+  void keep(Archive& archive) {
+    roles_.keep(archive);
+    estimate_.keep(archive);
+    archive.of_known_size(facts_);
+    archive.of_known_size(cell_has_light_);
+    spread_.keep(archive);
+  }
+
  private:
   /// What the nodes of one pass found.
   struct NodeLight;

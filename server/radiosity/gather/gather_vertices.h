@@ -27,6 +27,15 @@ class VertexGather {
     spread_.forget();
   }
 
+  /// Between passes.
+  template <typename Archive>
+  void keep(Archive& archive) {
+    estimate_.keep(archive);
+    for (auto* parts : {&parts_, &parts_behind_}) archive.of_known_size(*parts);
+    archive.of_known_size(is_known_);
+    spread_.keep(archive);
+  }
+
   const LightEstimate& estimate() const { return estimate_; }
   double relative_spread() const { return spread_.relative(); }
   /// [groups] Whether a group is not buried.

@@ -34,6 +34,12 @@ class ReplicateSpread {
   /// `squares`: of each replicate, summed over the receivers of one pass; weight as the pass's gathered light.
   void add_pass(double weight, std::span<const double> squares);
   void forget() { weight_ = 0; }
+  template <typename Archive>
+  void keep(Archive& archive) {
+    archive(weight_);
+    archive(mean_);
+    archive(deviation_);
+  }
   /// Standard deviation over mean.
   double relative() const { return mean_ > 0 ? deviation_ / mean_ : 0; }
 
@@ -87,6 +93,17 @@ class LightEstimate {
   double patch_square(std::size_t cell) const { return patch_square_[cell]; }
   void forget_interpolation(std::size_t cell) { interpolation_square_[cell] = 0; }
   double interpolation_square(std::size_t cell) const { return interpolation_square_[cell]; }
+
+  /// Between passes.
+  template <typename Archive>
+  void keep(Archive& archive) {
+    archive(gathered_weight_);
+    for (auto* values : {&direct_, &gathered_, &reflected_, &openness_, &direct_variance_, &gathered_variance_,
+                         &direct_weight_, &patch_square_, &interpolation_square_}) {
+      archive.of_known_size(*values);
+    }
+    archive.of_known_size(has_gathered_);
+  }
 
  private:
   static Vec3 at(const std::vector<float>& values, std::size_t i) {

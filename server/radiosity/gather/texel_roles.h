@@ -51,6 +51,12 @@ class TexelRoles {
   };
   std::optional<Between> between(int x, int y) const;
 
+  /// What passes have changed.
+  template <typename Archive>
+  void keep(Archive& archive) {
+    archive.of_known_size(is_plain_);
+  }
+
   /// The triangle that covers a texel wholly, or kNoTriangle.
   std::uint32_t home(int x, int y) const { return homes_[static_cast<std::size_t>(y) * width_ + x]; }
   /// A point of the texel's home, (dx, dy) within the texel. Precondition: it has one.

@@ -19,7 +19,7 @@ class NoGate : public WorkerGate {
 class QueueStatsTest : public ::testing::Test {
  protected:
   QueueStatsTest()
-      : content_(std::move(store::ContentStore::open(folder_.path(), 1 << 20)).value()),
+      : content_(std::move(store::TenantContent::open(folder_.path(), {1 << 20, 0})).value()),
         jobs_(std::move(store::JobStore::open(folder_.path() / "jobs.sqlite")).value()) {
     options_.spool_folder = folder_.path() / "spool";
     options_.worker.program = "/no/such/worker";
@@ -34,7 +34,7 @@ class QueueStatsTest : public ::testing::Test {
   store::TemporaryFolder folder_;
   QueueOptions options_;
   NoGate gate_;
-  std::unique_ptr<store::ContentStore> content_;
+  std::unique_ptr<store::TenantContent> content_;
   std::unique_ptr<store::JobStore> jobs_;
 };
 
@@ -42,8 +42,8 @@ TEST_F(QueueStatsTest, AsksToTryAgainUntilItHasTakenUpOldJobs) {
   const std::string name = jobs_->create(job("old")).value().name;
   JobQueue queue(options_, *jobs_, *content_);
   for (const Error& error : {queue.submit(job("new")).error(), queue.find(name).error(), queue.cancel(name).error(),
-                             queue.finish(name).error(), queue.find_request("old", "").error(),
-                             queue.start_plan({}, "", [](const Result<std::string>&) {}).error()}) {
+                             queue.finish(name).error(), queue.find_request("", "old", "").error(),
+                             queue.start_plan("", {}, [](const Result<std::string>&) {}).error()}) {
     EXPECT_EQ(error.code, ErrorCode::kUnavailable);
     EXPECT_THAT(error.message, HasSubstr("the server is starting"));
   }
@@ -56,7 +56,7 @@ TEST_F(QueueStatsTest, RefusesNewJobsAndPlansAndLeavesThoseThatWaitOnceItIsToEnd
   ASSERT_TRUE(queue.start(gate_).ok());
   queue.refuse_new();
   for (const Error& error :
-       {queue.submit(job("new")).error(), queue.start_plan({}, "", [](const Result<std::string>&) {}).error()}) {
+       {queue.submit(job("new")).error(), queue.start_plan("", {}, [](const Result<std::string>&) {}).error()}) {
     EXPECT_EQ(error.code, ErrorCode::kUnavailable);
     EXPECT_THAT(error.message, HasSubstr("the server is stopping"));
   }

@@ -82,6 +82,7 @@ std::map<std::string, std::vector<std::string>> bad_values() {
       {"max-message-bytes", with(kBadSizes, {"1K", "2G"})},
       {"max-digests-per-call", with(kBadNumbers, {"0", "10001"})},
       {"max-blob-bytes", with(kBadSizes, {"1023K", "2T"})},
+      {"max-content-bytes", with(kBadSizes, {"1025T"})},
       {"max-manifest-bytes", with(kBadSizes, {"1023", "2G"})},
       {"max-meshes", with(kBadNumbers, {"0", "1000001"})},
       {"max-textures", with(kBadNumbers, {"1000001"})},

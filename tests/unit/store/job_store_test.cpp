@@ -57,12 +57,12 @@ TEST_F(JobStoreTest, KeepsEverythingOfAJobAcrossAStart) {
 }
 
 TEST_F(JobStoreTest, KnowsARequestByItsIdAndBody) {
-  EXPECT_FALSE((*store_->find_request("a", "body")).has_value());
+  EXPECT_FALSE((*store_->find_request("", "a", "body")).has_value());
   const std::string name = create("a").name;
-  EXPECT_EQ((*store_->find_request("a", "body"))->name, name);
-  EXPECT_EQ(store_->find_request("a", "another body").error().code, ErrorCode::kAlreadyExists);
+  EXPECT_EQ((*store_->find_request("", "a", "body"))->name, name);
+  EXPECT_EQ(store_->find_request("", "a", "another body").error().code, ErrorCode::kAlreadyExists);
   EXPECT_EQ(store_->create(new_job("a")).error().code, ErrorCode::kAlreadyExists);
-  EXPECT_EQ(store_->list(10, 0)->size(), 1u);
+  EXPECT_EQ(store_->list(std::nullopt, 10, 0)->size(), 1u);
 }
 
 TEST_F(JobStoreTest, NumbersEventsWithoutGapsAndReadsThemFromAnyOn) {
@@ -108,11 +108,11 @@ TEST_F(JobStoreTest, FindsUnfinishedJobsOldestFirst) {
 TEST_F(JobStoreTest, ListsNewestFirstBelowAnId) {
   std::vector<std::string> names;
   for (const char* id : {"a", "b", "c"}) names.push_back(create(id).name);
-  const auto page = store_->list(2, 0);
+  const auto page = store_->list(std::nullopt, 2, 0);
   ASSERT_EQ(page->size(), 2u);
   EXPECT_EQ((*page)[0].name, names[2]);
   EXPECT_EQ((*page)[1].name, names[1]);
-  const auto rest = store_->list(2, page->back().id);
+  const auto rest = store_->list(std::nullopt, 2, page->back().id);
   ASSERT_EQ(rest->size(), 1u);
   EXPECT_EQ(rest->front().name, names[0]);
 }
@@ -120,6 +120,117 @@ TEST_F(JobStoreTest, ListsNewestFirstBelowAnId) {
 TEST_F(JobStoreTest, SaysThatAJobDoesNotExist) {
   EXPECT_EQ(store_->get("bakes/none").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->append_event("bakes/none", {}).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(JobStoreTest, KeepsTheRequestsOfTenantsApart) {
+  NewJob job{"a", "body", "label", "key", {}, {.tenant = "one", .client = "me", .trace_id = "trace", .priority = -3}};
+  const JobRecord first = *store_->create(job);
+  EXPECT_EQ(first.owner.tenant, "one");
+  EXPECT_EQ(first.owner.client, "me");
+  EXPECT_EQ(first.owner.trace_id, "trace");
+  EXPECT_EQ(first.owner.priority, -3);
+  EXPECT_FALSE(store_->find_request("two", "a", "another body")->has_value());
+  job.owner.tenant = "two";
+  EXPECT_TRUE(store_->create(job).ok());
+  EXPECT_EQ(store_->list("one", 10, 0)->size(), 1u);
+  EXPECT_EQ(store_->list(std::nullopt, 10, 0)->size(), 2u);
+}
+
+TEST_F(JobStoreTest, AnswersWithAResultOnlyWhoMayShareIt) {
+  NewJob job{"a", "body", "label", "key", {}, {.tenant = "one"}};
+  const Digest output = digest_of(std::string("a lightmap"));
+  const auto bake = [&](const std::string& request_id, bool is_shared, bool is_whole) {
+    job.request_id = request_id;
+    job.owner.is_shared = is_shared;
+    const std::string name = store_->create(job)->name;
+    EXPECT_TRUE(store_
+                    ->append_event(name, {.state = JobState::kSucceeded,
+                                          .result = "result of " + request_id,
+                                          .outputs = {output},
+                                          .is_whole = is_whole})
+                    .ok());
+    return name;
+  };
+  bake("private", false, true);
+  bake("ended early", true, false);
+  EXPECT_FALSE(store_->find_result("one", "key")->has_value());
+  const std::string name = bake("good", true, true);
+  EXPECT_FALSE(store_->find_result("two", "key")->has_value());
+  EXPECT_FALSE(store_->find_result("one", "another key")->has_value());
+  const auto stored = *store_->find_result("one", "key");
+  ASSERT_TRUE(stored.has_value());
+  EXPECT_EQ(stored->name, name);
+
+  job.request_id = "again";
+  const JobRecord answered = *store_->create(job, &*stored);
+  EXPECT_EQ(answered.state, JobState::kSucceeded);
+  EXPECT_EQ(answered.result, "result of good");
+  EXPECT_TRUE(answered.is_from_store);
+  EXPECT_EQ(answered.last_sequence, 2u);
+  EXPECT_EQ(store_->events_after(answered.name, 0)->size(), 2u);
+  EXPECT_THAT(*store_->outputs(answered.name), ::testing::ElementsAre(output));
+}
+
+TEST_F(JobStoreTest, KnowsWhichBlobsAreNeeded) {
+  const Digest input = digest_of(std::string("input")), other_input = digest_of(std::string("other input")),
+               output = digest_of(std::string("output")), checkpoint = digest_of(std::string("rows"));
+  Work work;
+  work.inputs = {input};
+  const JobRecord waits = *store_->create({"a", "body", "label", "key", work});
+  work.inputs = {other_input};
+  const JobRecord ends = *store_->create({"b", "body", "label", "other key", work});
+  ASSERT_TRUE(store_->append_event(ends.name, {.state = JobState::kSucceeded, .outputs = {output}}).ok());
+  ASSERT_TRUE(store_->put_checkpoint(waits, {"rows", other_input}).ok());
+  ASSERT_TRUE(store_->put_checkpoint(waits, {"rows", checkpoint}).ok());  // in its place
+  EXPECT_EQ(*store_->needed_blobs(""), (std::set<Digest>{input, output, checkpoint}));
+  EXPECT_TRUE(store_->needed_blobs("somebody else")->empty());
+
+  EXPECT_EQ(*store_->forget_ended("", ends.created_unix_ms - 1000, 10), 0u);
+  EXPECT_EQ(*store_->forget_ended("", ends.created_unix_ms + 1'000'000, 10), 1u);
+  ASSERT_TRUE(store_->drop_checkpoints(waits).ok());
+  EXPECT_EQ(*store_->needed_blobs(""), std::set<Digest>{input});
+}
+
+TEST_F(JobStoreTest, KeepsCheckpointsForTheNextAttemptOfTheSameBake) {
+  NewJob job{"a", "body", "label", "key", {}};
+  const JobRecord first = *store_->create(job);
+  ASSERT_TRUE(
+      store_->append_event(first.name, {.state = JobState::kQueued, .lost_attempts = 2, .failed_attempts = 1}).ok());
+  for (const char* name : {"rows/1", "rows/0", "pass"}) {
+    ASSERT_TRUE(store_->put_checkpoint(first, {name, digest_of(std::string(name))}).ok());
+  }
+  // It has got on.
+  EXPECT_EQ(store_->get(first.name)->lost_attempts, 0u);
+  EXPECT_EQ(store_->get(first.name)->failed_attempts, 0u);
+  ASSERT_TRUE(store_->drop_checkpoints(first, {"rows/1"}).ok());
+  job.request_id = "b";
+  const JobRecord equal = *store_->create(job);
+  const auto left = *store_->checkpoints(equal);
+  ASSERT_EQ(left.size(), 2u);
+  EXPECT_EQ(left[0].name, "pass");
+  EXPECT_EQ(left[1].digest, digest_of(std::string("rows/0")));
+  job.request_id = "c";
+  job.owner.is_shared = false;
+  EXPECT_TRUE(store_->checkpoints(*store_->create(job))->empty());
+}
+
+TEST_F(JobStoreTest, BringsAFileOfTheFirstVersionUpToDate) {
+  const std::string name = store_->create({"a", "body", "label", "key", {}})->name;
+  store_.reset();
+  {
+    auto database = Database::open(file_);
+    ASSERT_TRUE(database
+                    ->execute("DROP TABLE outputs; DROP TABLE checkpoints; ALTER TABLE jobs DROP COLUMN tenant;"
+                              "ALTER TABLE jobs DROP COLUMN client; ALTER TABLE jobs DROP COLUMN trace_id;"
+                              "ALTER TABLE jobs DROP COLUMN priority; ALTER TABLE jobs DROP COLUMN is_shared;"
+                              "ALTER TABLE jobs DROP COLUMN is_whole; ALTER TABLE jobs DROP COLUMN is_from_store;"
+                              "ALTER TABLE jobs DROP COLUMN failed_attempts; PRAGMA user_version=1")
+                    .ok());
+  }
+  auto store = JobStore::open(file_);
+  ASSERT_TRUE(store.ok()) << store.error().message;
+  EXPECT_EQ((*store)->get(name)->label, "label");
+  EXPECT_TRUE((*store)->get(name)->owner.is_shared);
 }
 
 TEST_F(JobStoreTest, SyncsEveryCommitAndMigratesAnEmptyFile) {
@@ -134,7 +245,7 @@ TEST_F(JobStoreTest, SyncsEveryCommitAndMigratesAnEmptyFile) {
   EXPECT_EQ(pragma("journal_mode"), "wal");
   EXPECT_EQ(pragma("synchronous"), "2");  // FULL
   EXPECT_EQ(pragma("foreign_keys"), "1");
-  EXPECT_EQ(pragma("user_version"), "1");
+  EXPECT_EQ(pragma("user_version"), "2");
 }
 
 TEST_F(JobStoreTest, RefusesAFileOfANewerVersionAndAFileThatIsNone) {

@@ -1,0 +1,53 @@
+#include "server/jobs/housekeeping.h"
+
+#include <spdlog/spdlog.h>
+
+#include <condition_variable>
+#include <mutex>
+
+namespace radbake::jobs {
+
+using std::chrono::system_clock;
+
+Housekeeping::Housekeeping(const HousekeepingOptions& options, store::JobStore& jobs, store::TenantContent& content)
+    : options_(options), jobs_(jobs), content_(content) {
+  content_.set_make_room([this](const std::string& tenant, store::ContentStore& store, std::uint64_t bytes) {
+    make_room(tenant, store, bytes);
+  });
+  thread_ = std::jthread([this](const std::stop_token& stop) { keep_house(stop); });
+}
+
+Housekeeping::~Housekeeping() { content_.set_make_room({}); }
+
+void Housekeeping::keep_house(const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any woken;
+  std::unique_lock lock(mutex);
+  while (!stop.stop_requested()) {
+    woken.wait_for(lock, stop, options_.interval, [] { return false; });
+    const auto resting_since = std::chrono::steady_clock::now() - options_.upload_rest;
+    content_.for_each(
+        [&](const std::string&, store::ContentStore& store) { store.close_resting_uploads(resting_since); });
+  }
+}
+
+void Housekeeping::make_room(const std::string& tenant, store::ContentStore& content, std::uint64_t bytes) {
+  constexpr std::uint32_t kForgottenAtOnce = 20;
+  const auto now = system_clock::now();
+  const auto forgotten_before =
+      std::chrono::duration_cast<std::chrono::milliseconds>((now - options_.keep_results).time_since_epoch()).count();
+  std::uint64_t freed = 0;
+  while (true) {
+    const auto needed = jobs_.needed_blobs(tenant);
+    if (!needed.ok()) return spdlog::error("no room is made: {}", needed.error().message);
+    freed += content.sweep(*needed, now - options_.blob_grace, bytes - freed);
+    if (freed >= bytes) break;
+    const auto num_forgotten = jobs_.forget_ended(tenant, forgotten_before, kForgottenAtOnce);
+    if (!num_forgotten.ok()) return spdlog::error("no room is made: {}", num_forgotten.error().message);
+    if (*num_forgotten == 0) break;
+    spdlog::info("forgot {} bakes that ended more than {} h ago", *num_forgotten, options_.keep_results.count());
+  }
+  spdlog::info("swept {} bytes, {} were lacking", freed, bytes);
+}
+
+}  // namespace radbake::jobs

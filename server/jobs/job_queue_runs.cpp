@@ -1,0 +1,390 @@
+// What runs: workers are started for jobs and plans, and what becomes of them is recorded.
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/log/log.h"
+#include "server/jobs/job_queue.h"
+#include "server/store/failpoint.h"
+
+namespace radbake::jobs {
+
+using store::JobRecord;
+using store::JobState;
+using store::StateChange;
+
+void JobQueue::line_up(const std::shared_ptr<Job>& job) {
+  const JobRecord record = job->record();
+  waiting_.push({record.name, record.owner.tenant + '\n' + record.owner.client, record.owner.priority, record.id});
+}
+
+void JobQueue::run_waiting_jobs() {
+  while (!is_refusing_ && !is_draining_ && disk_problem_.empty() && !waiting_.is_empty() &&
+         num_running_ < options_.max_running) {
+    const std::string name = waiting_.pop(usual_seconds_).name;
+    charged_[name] = usual_seconds_;
+    if (const auto job = find_live(name)) start_job(job);
+  }
+}
+
+void JobQueue::add_run(const std::shared_ptr<WorkerRun>& run) {
+  {
+    const std::lock_guard lock(mutex_);
+    runs_[run->assignment().job] = run;
+  }
+  runs_changed_.notify_all();
+}
+
+RunEvents JobQueue::ends_of(const std::string& name) {
+  RunEvents events;
+  events.on_outcome = [this, name](WorkOutcome outcome) {
+    thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
+  };
+  events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
+  return events;
+}
+
+void JobQueue::start_job(const std::shared_ptr<Job>& job) {
+  const JobRecord record = job->record();
+  const std::string name = record.name;
+  // The attempt is on disk before there is a worker that claims it.
+  auto begun = begin_attempt(job, record);
+  if (!begun.ok()) {
+    pause_for_disk(begun.error());
+    return line_up(job);
+  }
+  const std::shared_ptr<TileSpool> spool = std::move(begun).value();
+  job->set_tiles(spool);
+
+  RunEvents events = ends_of(name);
+  events.on_progress = [this, job, last = JobState::kPreparing](const JobProgress& progress) mutable {
+    if (!is_running(progress.state)) return;
+    if (std::exchange(last, progress.state) != progress.state) {
+      thread_.post([this, name = job->record().name, state = progress.state] { advance(name, state); });
+    }
+    job->set_progress(progress);
+  };
+  events.on_tile = [job, spool, is_full = false](const std::string& tile) mutable {
+    if (is_full) return;
+    // Tiles are a preview: without room for them the bake itself goes on.
+    if (auto appended = spool->append(tile); !appended.ok()) {
+      is_full = true;
+      spdlog::warn("no more tiles of this attempt are kept: {}", appended.error().message);
+    }
+    job->tile_arrived();
+  };
+  events.on_checkpoint = [this, name, attempt = record.attempt](const store::CheckpointRecord& checkpoint) {
+    thread_.post([this, name, attempt, checkpoint] { keep_checkpoint(name, attempt, checkpoint); });
+  };
+  events.on_drop_checkpoints = [this, name](const std::vector<std::string>& names) {
+    thread_.post([this, name, names] { drop_checkpoints(name, names); });
+  };
+  auto content = content_.of(record.owner.tenant);
+  if (!content.ok()) {
+    pause_for_disk(content.error());
+    return queue_again(job, content.error().message, false);
+  }
+  WorkerRun::Assignment assignment{.job = name,
+                                   .attempt = record.attempt,
+                                   .work = record.work,
+                                   .accepted_unix_ms = record.created_unix_ms,
+                                   .trace_id = record.owner.trace_id};
+  if (auto checkpoints = store_.checkpoints(record); checkpoints.ok()) {
+    assignment.checkpoints = std::move(checkpoints).value();
+    std::erase_if(assignment.checkpoints, [&](const auto& left) { return !(*content)->contains(left.digest); });
+  }
+  const auto run = std::make_shared<WorkerRun>(std::move(assignment), options_.worker, **content, std::move(events));
+  if (to_finish_.contains(name)) run->request_finish();
+  add_run(run);
+  ++num_running_;
+  store::failpoint("worker.starting");
+  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
+    fail(job, started.error());
+    end_run(name, {});
+  }
+  store::failpoint("worker.started");
+}
+
+Result<std::shared_ptr<TileSpool>> JobQueue::begin_attempt(const std::shared_ptr<Job>& job, const JobRecord& record) {
+  RADBAKE_ASSIGN_OR_RETURN(std::shared_ptr<TileSpool> spool, TileSpool::create(options_.spool_folder));
+  RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kPreparing,
+                                       .attempt = record.attempt,
+                                       .lost_attempts = record.lost_attempts,
+                                       .message = "attempt " + std::to_string(record.attempt) + " starts",
+                                       .failed_attempts = record.failed_attempts}));
+  return spool;
+}
+
+void JobQueue::advance(const std::string& name, JobState state) {
+  const std::shared_ptr<Job> job = find_live(name);
+  if (!job) return;
+  const JobRecord record = job->record();
+  // Passes go through the stages again; the record tells the furthest that was come to, and progress the present one.
+  if (!is_running(record.state) || record.state >= state) return;
+  if (auto changed = change(job, {.state = state,
+                                  .attempt = record.attempt,
+                                  .lost_attempts = record.lost_attempts,
+                                  .failed_attempts = record.failed_attempts});
+      !changed.ok()) {
+    spdlog::error("{}: {}", name, changed.error().message);
+  }
+}
+
+Result<void> JobQueue::change_one(const std::shared_ptr<Job>& job, const StateChange& change) {
+  const JobRecord before = job->record();
+  const std::string& name = before.name;
+  const LogTrace trace(before.owner.trace_id);
+  const std::int64_t entered_unix_ms = job->entered_unix_ms();
+  RADBAKE_ASSIGN_OR_RETURN(store::RecordedChange recorded, store_.append_event(name, change));
+  const JobRecord& record = recorded.record;
+  if (options_.observer != nullptr) {
+    constexpr double kMsPerSecond = 1000;
+    options_.observer->state_changed(before.state, record.state,
+                                     static_cast<double>(recorded.event.unix_ms - entered_unix_ms) / kMsPerSecond);
+  }
+  spdlog::info("{} {} (attempt {}): {}", name, job_state_name(record.state), record.attempt,
+               record.error ? record.error->message : change.message);
+  const bool has_ended = is_terminal(record.state);
+  job->set_record(std::move(recorded.record), std::move(recorded.event));
+  if (has_ended) {
+    to_finish_.erase(name);
+    const std::lock_guard lock(mutex_);
+    live_.erase(name);
+  }
+  return {};
+}
+
+Result<void> JobQueue::change(const std::shared_ptr<Job>& job, StateChange change) {
+  if (change.message.empty()) change.message = job_state_name(change.state);
+  RADBAKE_RETURN_IF_ERROR(change_one(job, change));
+  // What somebody ended early is not what the others wait for.
+  if (change.state == JobState::kCancelled || !change.is_whole) {
+    hand_over_followers(job);
+    return {};
+  }
+  for (const auto& follower : job->followers()) {
+    if (is_terminal(change.state)) leave_leader(follower);
+    if (auto changed = change_one(follower, change); changed.ok() || !is_terminal(change.state)) continue;
+    unsaved_.push_back({follower, change});
+  }
+  if (is_terminal(change.state)) {
+    if (auto dropped = store_.drop_checkpoints(job->record()); !dropped.ok()) {
+      spdlog::warn("checkpoints stay: {}", dropped.error().message);
+    }
+  }
+  return {};
+}
+
+void JobQueue::end_job(const std::shared_ptr<Job>& job, StateChange end) {
+  const JobRecord record = job->record();
+  end.attempt = record.attempt;
+  end.lost_attempts = record.lost_attempts;
+  end.failed_attempts = record.failed_attempts;
+  if (auto changed = change(job, end); !changed.ok()) {
+    pause_for_disk(changed.error());
+    unsaved_.push_back({job, std::move(end)});
+  } else if (const auto run = find_run(record.name)) {
+    run->accept();
+  }
+}
+
+void JobQueue::fail(const std::shared_ptr<Job>& job, Error error) {
+  end_job(job, {.state = JobState::kFailed, .message = error.message, .error = error});
+}
+
+bool JobQueue::is_unsaved(const std::shared_ptr<Job>& job) const {
+  return std::any_of(unsaved_.begin(), unsaved_.end(), [&](const Unsaved& end) { return end.job == job; });
+}
+
+void JobQueue::queue_again(const std::shared_ptr<Job>& job, const std::string& why, bool has_failed) {
+  const JobRecord record = job->record();
+  StateChange again{.state = JobState::kQueued,
+                    .attempt = record.attempt + (is_running(record.state) ? 1 : 0),
+                    .lost_attempts = record.lost_attempts,
+                    .message = why,
+                    .failed_attempts = record.failed_attempts + (has_failed ? 1 : 0)};
+  if (auto changed = change(job, again); !changed.ok()) {
+    pause_for_disk(changed.error());
+    unsaved_.push_back({job, std::move(again)});
+  } else if (!is_draining_) {
+    line_up(job);
+  }
+}
+
+void JobQueue::pause_for_disk(const Error& problem) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (disk_problem_.empty()) spdlog::error("nothing starts until the disk is well again: {}", problem.message);
+    disk_problem_ = problem.message;
+    disk_tried_at_ = WorkerRun::Clock::now();
+  }
+  runs_changed_.notify_all();
+}
+
+void JobQueue::retry_disk() {
+  if (disk_problem_.empty()) return;
+  if (auto content = content_.of(""); !content.ok() || !(*content)->probe().ok()) return;
+  while (!unsaved_.empty()) {
+    const auto [job, end] = unsaved_.front();
+    if (!change(job, end).ok()) return;
+    unsaved_.pop_front();
+    if (end.state == JobState::kQueued) line_up(job);
+    if (const auto run = find_run(job->record().name)) run->accept();
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    disk_problem_.clear();
+  }
+  spdlog::info("the disk is well again");
+  run_waiting_jobs();
+}
+
+void JobQueue::keep_checkpoint(const std::string& name, std::uint32_t attempt,
+                               const store::CheckpointRecord& checkpoint) {
+  const auto job = find_live(name);
+  if (!job || job->record().attempt != attempt) return;
+  // Without it the bake itself goes on.
+  if (auto kept = store_.put_checkpoint(job->record(), checkpoint); !kept.ok()) {
+    spdlog::warn("{}: checkpoint '{}' is not kept: {}", name, checkpoint.name, kept.error().message);
+    return;
+  }
+  store::failpoint("checkpoint.kept");
+  job->forget_lost_attempts();
+}
+
+void JobQueue::drop_checkpoints(const std::string& name, const std::vector<std::string>& names) {
+  const auto job = find_live(name);
+  if (!job) return;
+  if (auto dropped = store_.drop_checkpoints(job->record(), names); !dropped.ok()) {
+    spdlog::warn("{}: old checkpoints stay: {}", name, dropped.error().message);
+  }
+}
+
+void JobQueue::end_work(const std::string& name, WorkOutcome outcome) {
+  const auto run = find_run(name);
+  using Kind = WorkOutcome::Kind;
+  if (plans_.contains(name)) {
+    switch (outcome.kind) {
+      case Kind::kSucceeded: finish_plan(name, std::move(outcome.result)); break;
+      case Kind::kFailed: finish_plan(name, std::move(outcome.error)); break;
+      case Kind::kCancelled: finish_plan(name, Error{ErrorCode::kCancelled, "cancelled"}); break;
+    }
+    if (run) run->accept();
+    return;
+  }
+  const auto job = find_live(name);
+  if (!job || is_unsaved(job)) return;
+  store::failpoint("result.publishing");
+  if (outcome.kind == Kind::kFailed) {
+    fail(job, std::move(outcome.error));
+  } else if (outcome.kind == Kind::kSucceeded) {
+    end_job(job, {.state = JobState::kSucceeded,
+                  .result = std::move(outcome.result),
+                  .outputs = std::move(outcome.outputs),
+                  .is_whole = !to_finish_.contains(name)});
+  } else if (run && run->is_cancel_requested()) {
+    end_job(job, {.state = JobState::kCancelled});
+  } else {
+    fail(job, internal_error("the worker stopped without being asked to"));
+  }
+  store::failpoint("result.published");
+}
+
+void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
+  const auto run = find_run(name);
+  if (!run) return;
+  const std::string killed_because = run->kill_reason();
+  const LogTrace trace(run->assignment().trace_id);
+  const std::string reason =
+      "the worker " + (killed_because.empty() ? exit.reason : killed_because + " and was stopped");
+  if (run->assignment().is_plan) {
+    finish_plan(name, run->is_cancel_requested() ? Error{ErrorCode::kCancelled, "cancelled"} : internal_error(reason));
+  } else {
+    --num_running_;
+    if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
+    const double seconds = run->seconds();
+    if (const auto charged = charged_.extract(name)) {
+      const JobRecord record = find(name).ok() ? (*find(name))->record() : JobRecord{};
+      waiting_.settle(record.owner.tenant + '\n' + record.owner.client, charged.mapped(), seconds);
+    }
+    constexpr double kNewest = 0.3;
+    usual_seconds_ =
+        usual_seconds_ == kFirstGuessSeconds ? seconds : usual_seconds_ + kNewest * (seconds - usual_seconds_);
+  }
+  // Whoever still lives here got no outcome from its worker.
+  if (const auto job = find_live(name); job && !is_unsaved(job)) end_job_run(job, *run, reason);
+  {
+    const std::lock_guard lock(mutex_);
+    runs_.erase(name);
+  }
+  runs_changed_.notify_all();
+  run_waiting_jobs();
+  make_worker_ready();
+}
+
+void JobQueue::end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run, const std::string& reason) {
+  const std::uint32_t failed = job->record().failed_attempts + 1;
+  if (run.is_cancel_requested()) return end_job(job, {.state = JobState::kCancelled, .message = reason});
+  if (is_draining_) return queue_again(job, "the server is stopping; goes on at its next start", false);
+  switch (run.blame()) {
+    case WorkerRun::Blame::kBake: return fail(job, internal_error(reason));
+    case WorkerRun::Blame::kServer: pause_for_disk(internal_error(reason)); return queue_again(job, reason, false);
+    case WorkerRun::Blame::kWorker: break;
+  }
+  if (failed >= options_.max_failed_attempts) {
+    return fail(job,
+                internal_error(reason + (failed > 1 ? " (" + std::to_string(failed) + " attempts in a row)" : "")));
+  }
+  queue_again(job, reason + "; it goes on in another attempt", true);
+}
+
+Result<std::string> JobQueue::start_plan(const std::string& tenant, const store::Work& work, PlanDone on_done,
+                                         const std::string& trace_id) {
+  RADBAKE_RETURN_IF_ERROR(check_recovered());
+  return thread_.run([&] { return start_plan_run(tenant, work, std::move(on_done), trace_id); });
+}
+
+Result<std::string> JobQueue::start_plan_run(const std::string& tenant, const store::Work& work, PlanDone on_done,
+                                             const std::string& trace_id) {
+  if (is_refusing_ || is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
+  if (plans_.size() >= options_.max_running_plans) {
+    return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
+                                                    " plans are being made, max_running_plans is " +
+                                                    std::to_string(options_.max_running_plans)};
+  }
+  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(tenant));
+  const std::string name = "plans/" + std::to_string(next_plan_++);
+  RunEvents events = ends_of(name);
+  events.on_progress = [](const JobProgress&) {};
+  events.on_tile = [](const std::string&) {};
+  const auto run = std::make_shared<WorkerRun>(
+      WorkerRun::Assignment{
+          .job = name, .is_plan = true, .work = work, .time_limit = options_.plan_limit, .trace_id = trace_id},
+      options_.worker, *content, std::move(events));
+  add_run(run);
+  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
+    const std::lock_guard lock(mutex_);
+    runs_.erase(name);
+    return started.error();
+  }
+  plans_[name] = std::move(on_done);
+  return name;
+}
+
+void JobQueue::cancel_plan(const std::string& name) {
+  thread_.post([this, name] {
+    if (const auto run = find_run(name)) request_cancel(*run);
+  });
+}
+
+void JobQueue::finish_plan(const std::string& name, Result<std::string> plan) {
+  const auto found = plans_.find(name);
+  if (found == plans_.end()) return;
+  const PlanDone on_done = std::move(found->second);
+  plans_.erase(found);
+  on_done(std::move(plan));
+}
+
+}  // namespace radbake::jobs

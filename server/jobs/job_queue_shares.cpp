@@ -1,0 +1,62 @@
+// Jobs that share one run.
+
+#include <spdlog/spdlog.h>
+
+#include "server/jobs/job_queue.h"
+
+namespace radbake::jobs {
+
+using store::JobRecord;
+using store::JobState;
+
+std::shared_ptr<Job> JobQueue::find_leader(const store::JobOwner& owner, const std::string& bake_key) const {
+  for (const auto& [name, job] : live_) {
+    const JobRecord record = job->record();
+    if (record.bake_key != bake_key || record.owner.tenant != owner.tenant || !record.owner.is_shared) continue;
+    if (leaders_.contains(name) || to_finish_.contains(name) || is_unsaved(job)) continue;
+    const auto run = find_run(name);
+    if (!run || !run->is_cancel_requested()) return job;
+  }
+  return nullptr;
+}
+
+std::shared_ptr<Job> JobQueue::leader_of(const std::string& follower) const {
+  const auto found = leaders_.find(follower);
+  return found == leaders_.end() ? nullptr : find_live(found->second);
+}
+
+void JobQueue::follow(const std::shared_ptr<Job>& follower, const std::shared_ptr<Job>& leader) {
+  const JobRecord own = follower->record(), leads = leader->record();
+  leaders_[own.name] = leads.name;
+  leader->add_follower(follower);
+  spdlog::info("{} shares the run of {}", own.name, leads.name);
+  if (!is_running(leads.state)) return;
+  const auto changed = change_one(follower, {.state = leads.state,
+                                             .attempt = own.attempt,
+                                             .lost_attempts = own.lost_attempts,
+                                             .message = "shares the run of " + leads.name,
+                                             .failed_attempts = own.failed_attempts});
+  if (!changed.ok()) spdlog::error("{}: {}", own.name, changed.error().message);
+}
+
+void JobQueue::leave_leader(const std::shared_ptr<Job>& follower) {
+  const std::string name = follower->record().name;
+  if (const auto leader = leader_of(name)) leader->remove_follower(follower);
+  leaders_.erase(name);
+}
+
+void JobQueue::hand_over_followers(const std::shared_ptr<Job>& leader) {
+  std::shared_ptr<Job> next;
+  for (const auto& follower : leader->followers()) {
+    leader->remove_follower(follower);
+    leaders_.erase(follower->record().name);
+    if (next) {
+      follow(follower, next);
+      continue;
+    }
+    next = follower;
+    queue_again(next, "runs by itself: " + leader->record().name + " ended early", false);
+  }
+}
+
+}  // namespace radbake::jobs

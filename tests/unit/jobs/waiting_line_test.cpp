@@ -1,0 +1,67 @@
+#include "server/jobs/waiting_line.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace radbake::jobs {
+namespace {
+
+using ::testing::ElementsAre;
+
+constexpr double kSeconds = 10;
+
+TEST(WaitingLine, KeepsTheOrderOfOneClient) {
+  WaitingLine line;
+  line.push({"second", "me", 0, 2});
+  line.push({"third", "me", 0, 3});
+  line.push({"first", "me", 0, 1});
+  EXPECT_THAT(line.order(kSeconds), ElementsAre("first", "second", "third"));
+  EXPECT_TRUE(line.erase("second"));
+  EXPECT_FALSE(line.erase("second"));
+  EXPECT_EQ(line.size(), 2u);
+  EXPECT_EQ(line.pop(kSeconds).name, "first");
+  EXPECT_EQ(line.pop(kSeconds).name, "third");
+  EXPECT_TRUE(line.is_empty());
+}
+
+TEST(WaitingLine, PutsPriorityBeforeFairness) {
+  WaitingLine line;
+  line.push({"low", "me", -1, 1});
+  line.push({"normal", "you", 0, 2});
+  line.push({"high", "me", 5, 3});
+  line.push({"high too", "me", 5, 4});
+  EXPECT_THAT(line.order(kSeconds), ElementsAre("high", "high too", "normal", "low"));
+}
+
+TEST(WaitingLine, TakesTurnsBetweenClients) {
+  WaitingLine line;
+  for (int i = 0; i < 4; ++i) line.push({"many " + std::to_string(i), "many", 0, i});
+  line.push({"few 0", "few", 0, 10});
+  line.push({"few 1", "few", 0, 11});
+  EXPECT_THAT(line.order(kSeconds), ElementsAre("many 0", "few 0", "many 1", "few 1", "many 2", "many 3"));
+}
+
+TEST(WaitingLine, CountsSecondsNotJobs) {
+  WaitingLine line;
+  for (int i = 0; i < 4; ++i) line.push({"short " + std::to_string(i), "short", 0, i});
+  for (int i = 0; i < 3; ++i) line.push({"long " + std::to_string(i), "long", 0, 10 + i});
+  std::vector<std::string> names;
+  while (!line.is_empty()) {
+    const Waiting next = line.pop(kSeconds);
+    names.push_back(next.name);
+    line.settle(next.client, kSeconds, next.client == "long" ? 2.5 * kSeconds : kSeconds);
+  }
+  EXPECT_THAT(names, ElementsAre("short 0", "long 0", "short 1", "short 2", "long 1", "short 3", "long 2"));
+}
+
+TEST(WaitingLine, GivesNoCreditForRest) {
+  WaitingLine line;
+  for (int i = 0; i < 8; ++i) line.push({"busy " + std::to_string(i), "busy", 0, i});
+  for (int i = 0; i < 5; ++i) line.pop(kSeconds);
+  for (int i = 0; i < 3; ++i) line.push({"new " + std::to_string(i), "new", 0, 10 + i});
+  // Level with the other, not five bakes ahead of it.
+  EXPECT_THAT(line.order(kSeconds), ElementsAre("new 0", "busy 5", "new 1", "busy 6", "new 2", "busy 7"));
+}
+
+}  // namespace
+}  // namespace radbake::jobs

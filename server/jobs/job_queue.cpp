@@ -35,9 +35,11 @@ Result<void> JobQueue::start(WorkerGate& gate) {
   gate_ = &gate;
   raise_open_file_limit();
   watchdog_ = std::jthread([this](std::stop_token stop) { watch_limits(stop); });
-  RADBAKE_RETURN_IF_ERROR(thread_.run([this] { return recover(); }));
-  has_recovered_ = true;
-  return {};
+  return thread_.run([this] {
+    const Result<void> recovered = recover();
+    has_recovered_ = recovered.ok();
+    return recovered;
+  });
 }
 
 Result<void> JobQueue::check_recovered() const {
@@ -105,13 +107,13 @@ Result<std::shared_ptr<Job>> JobQueue::submit(const store::NewJob& job) {
 
 Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) {
   const store::JobOwner& owner = new_job.owner;
+  const LogTrace trace(owner.trace_id);
   RADBAKE_ASSIGN_OR_RETURN(const std::shared_ptr<Job> known,
                            find_request(owner.tenant, new_job.request_id, new_job.body_sha256));
   if (known) return known;
   if (is_refusing_ || is_draining_) {
     return Error{ErrorCode::kUnavailable, "the server is stopping: submit again later"};
   }
-  const LogTrace trace(owner.trace_id);
 
   // Baked before, or being baked?
   std::shared_ptr<Job> leader;

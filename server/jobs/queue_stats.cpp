@@ -15,10 +15,12 @@ QueueStats JobQueue::stats() const {
 }
 
 AttemptEnd JobQueue::attempt_end_of(const WorkerRun& run) const {
-  // Whoever still lives here got no outcome from its worker.
-  if (!find_live(run.assignment().job)) return AttemptEnd::kOutcome;
+  // Whoever still lives here got no outcome from its worker, or the disk has not taken it yet.
+  const auto job = find_live(run.assignment().job);
+  if (!job || is_unsaved(job)) return AttemptEnd::kOutcome;
   if (run.is_cancel_requested()) return AttemptEnd::kCancelled;
   if (is_draining_) return AttemptEnd::kServerStopping;
+  if (run.blame() == WorkerRun::Blame::kServer) return AttemptEnd::kDiskRefused;
   return run.kill_reason().empty() ? AttemptEnd::kWorkerDied : AttemptEnd::kWorkerKilled;
 }
 

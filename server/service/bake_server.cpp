@@ -96,7 +96,9 @@ void BakeServer::make_services() {
   queue_ = std::make_unique<jobs::JobQueue>(std::move(queue_options), *jobs_, *content_);
   pool_ = std::make_unique<store::TaskPool>(kPoolThreads);
   costs_ = std::make_unique<CostFile>(options_.costs.empty() ? options_.data / "costs.txt" : options_.costs);
-  disk_ = std::make_unique<DiskWatch>(options_.disk, readiness_);
+  DiskWatchOptions disk = options_.disk;
+  disk.problem = [queue = queue_.get()] { return queue->disk_problem(); };
+  disk_ = std::make_unique<DiskWatch>(std::move(disk), readiness_);
   workers_service_ = std::make_unique<WorkersService>(*queue_, *pool_, *costs_, metrics_, limits);
   content_service_ = std::make_unique<ContentService>(*content_, *pool_, *disk_, limits);
   bakes_service_ = std::make_unique<BakesService>(*queue_, *content_, *pool_, *disk_, limits, options_.max_threads);
@@ -111,8 +113,10 @@ std::string BakeServer::metrics_page() {
   snapshot.min_free_disk_bytes = options_.limits.min_free_disk_bytes;
   if (has_parts_) {
     snapshot.queue = queue_->stats();
-    snapshot.upload_bytes = content_->upload_bytes();
-    snapshot.content_bytes = disk_->content_bytes();
+    content_->for_each([&](const std::string&, const store::ContentStore& content) {
+      snapshot.upload_bytes += content.upload_bytes();
+      snapshot.content_bytes += content.used_bytes();
+    });
     snapshot.free_disk_bytes = disk_->free_bytes();
   }
   return metrics_.render(snapshot, readiness_);

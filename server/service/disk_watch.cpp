@@ -10,12 +10,6 @@
 #include "server/service/config_values.h"
 
 namespace radbake::service {
-namespace {
-
-constexpr std::chrono::minutes kCountInterval{1};
-
-}  // namespace
-
 Result<std::uint64_t> free_disk_bytes(const std::filesystem::path& folder) {
   struct statvfs facts {};
   if (::statvfs(folder.c_str(), &facts) != 0) {
@@ -55,30 +49,16 @@ void DiskWatch::look() {
   } else {
     readiness_.clear(Obstacle::kDiskFull);
   }
-}
-
-void DiskWatch::count_content() {
-  namespace fs = std::filesystem;
-  std::uint64_t total = 0;
-  std::error_code problem;
-  fs::recursive_directory_iterator entries(options_.folder / "content" / "objects", problem);
-  // What is removed while this runs is not there: no failure.
-  for (; !problem && entries != fs::recursive_directory_iterator(); entries.increment(problem)) {
-    std::error_code gone;
-    if (!entries->is_regular_file(gone) || gone) continue;
-    const std::uintmax_t size = entries->file_size(gone);
-    if (!gone) total += size;
+  const std::string problem = options_.problem ? options_.problem() : "";
+  if (problem.empty()) {
+    readiness_.clear(Obstacle::kDiskRefuses);
+  } else {
+    readiness_.set(Obstacle::kDiskRefuses, problem);
   }
-  content_bytes_ = total;
 }
 
 void DiskWatch::watch(std::stop_token stop) {
-  auto count_at = std::chrono::steady_clock::now();
   while (!stop.stop_requested()) {
-    if (const auto now = std::chrono::steady_clock::now(); now >= count_at) {
-      count_content();
-      count_at = now + kCountInterval;
-    }
     std::unique_lock lock(mutex_);
     wakeup_.wait_for(lock, stop, options_.interval, [] { return false; });
     lock.unlock();

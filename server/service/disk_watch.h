@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "common/base/result.h"
@@ -22,10 +23,12 @@ struct DiskWatchOptions {
   std::uint64_t min_free_bytes = 0;  ///< 0: no floor
   std::chrono::milliseconds interval{1000};
   std::function<Result<std::uint64_t>(const std::filesystem::path&)> probe = free_disk_bytes;
+  std::function<std::string()> problem;  ///< what the disk refused to take of late; empty: nothing. May be null
 };
 
 /// Looks at the data folder's disk again and again. Below the floor, or when it cannot be looked at, the server is not
-/// ready (Obstacle::kDiskFull) and admit() refuses; above it both end by themselves. Thread-safe.
+/// ready (Obstacle::kDiskFull) and admit() refuses; above it both end by themselves. Nor is it ready while the disk
+/// refuses what is to be recorded (Obstacle::kDiskRefuses). Thread-safe.
 class DiskWatch {
  public:
   /// Looks once before it returns.
@@ -36,19 +39,15 @@ class DiskWatch {
   /// Errors: kResourceExhausted with min_free_disk_bytes, its value and what is free.
   Result<void> admit() const;
   std::uint64_t free_bytes() const { return free_bytes_; }
-  /// All files in the folder's content/objects; counted once a minute at most.
-  std::uint64_t content_bytes() const { return content_bytes_; }
 
  private:
   void look();
-  void count_content();
   void watch(std::stop_token stop);
   std::string shortage() const;
 
   const DiskWatchOptions options_;
   Readiness& readiness_;
   std::atomic<std::uint64_t> free_bytes_ = 0;
-  std::atomic<std::uint64_t> content_bytes_ = 0;
   std::mutex mutex_;
   std::condition_variable_any wakeup_;
   std::jthread thread_;

@@ -35,6 +35,7 @@ const char* label_of(jobs::AttemptEnd end) {
     case jobs::AttemptEnd::kServerStopping: return "server_stopping";
     case jobs::AttemptEnd::kWorkerDied: return "worker_died";
     case jobs::AttemptEnd::kWorkerKilled: return "worker_killed";
+    case jobs::AttemptEnd::kDiskRefused: return "disk_refused";
   }
   return "unknown";
 }
@@ -111,8 +112,9 @@ Metrics::Metrics()
   for (const auto state : {store::JobState::kSucceeded, store::JobState::kFailed, store::JobState::kCancelled}) {
     bakes_ended_.Add({{"state", label_of(state)}});
   }
-  for (const auto end : {jobs::AttemptEnd::kOutcome, jobs::AttemptEnd::kCancelled, jobs::AttemptEnd::kServerStopping,
-                         jobs::AttemptEnd::kWorkerDied, jobs::AttemptEnd::kWorkerKilled}) {
+  for (const auto end :
+       {jobs::AttemptEnd::kOutcome, jobs::AttemptEnd::kCancelled, jobs::AttemptEnd::kServerStopping,
+        jobs::AttemptEnd::kWorkerDied, jobs::AttemptEnd::kWorkerKilled, jobs::AttemptEnd::kDiskRefused}) {
     attempts_ended_.Add({{"reason", label_of(end)}});
   }
   gauge("radbake_build_info", "1; the labels say what runs",
@@ -181,7 +183,7 @@ std::string Metrics::render(const MetricsSnapshot& snapshot, const Readiness& re
   gauge("radbake_running_plans", "Plans that are being made").Set(as_double(snapshot.queue.num_plans));
   gauge("radbake_max_queued_bakes", "The limit of that name").Set(as_double(snapshot.max_queued_bakes));
   gauge("radbake_max_running_bakes", "The limit of that name").Set(as_double(snapshot.max_running_bakes));
-  gauge("radbake_content_bytes", "Scenes and results on the disk, as counted once a minute")
+  gauge("radbake_content_bytes", "Scenes and results on the disk, and the room that uploads have reserved")
       .Set(as_double(snapshot.content_bytes));
   gauge("radbake_upload_bytes", "Received of uploads that are not complete").Set(as_double(snapshot.upload_bytes));
   gauge("radbake_disk_free_bytes", "Free on the data folder's disk").Set(as_double(snapshot.free_disk_bytes));

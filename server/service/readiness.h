@@ -8,9 +8,10 @@
 namespace radbake::service {
 
 /// What keeps a server from taking work.
-enum class Obstacle { kRecovering, kDiskFull, kDraining };
-inline constexpr Obstacle kObstacles[] = {Obstacle::kRecovering, Obstacle::kDiskFull, Obstacle::kDraining};
-/// "recovering", "disk_full", "draining".
+enum class Obstacle { kRecovering, kDiskFull, kDiskRefuses, kDraining };
+inline constexpr Obstacle kObstacles[] = {Obstacle::kRecovering, Obstacle::kDiskFull, Obstacle::kDiskRefuses,
+                                          Obstacle::kDraining};
+/// "recovering", "disk_full", "disk_refuses", "draining".
 const char* obstacle_name(Obstacle obstacle);
 
 /// Whether the server takes work, and if not, why. It does when nothing stands in its way; it begins as recovering.

@@ -233,7 +233,13 @@ std::uint64_t ContentStore::upload_bytes() const {
   std::uint64_t total = 0;
   for (const auto& [digest, upload] : uploads) {
     const std::lock_guard upload_lock(upload->mutex);
-    if (!upload->is_over && upload->writer) total += upload->writer->size();
+    if (upload->is_over) continue;
+    struct stat facts {};
+    if (upload->writer) {
+      total += upload->writer->size();
+    } else if (::stat(upload_path(digest).c_str(), &facts) == 0) {
+      total += static_cast<std::uint64_t>(facts.st_size);
+    }
   }
   return total;
 }

@@ -1,5 +1,5 @@
-// Linked into radbaked for tests: RADBAKE_FAILPOINT=NAME:K kills the server, as kill -9 does, when it comes to a failpoint
-// for the K-th time. RADBAKE_FAILPOINT=list:FILE writes the names of the failpoints that it passes to a file.
+// Linked into radbaked for tests: RADBAKE_FAILPOINT=NAME:K kills the server, as kill -9 does, when it comes to a
+// failpoint for the K-th time. RADBAKE_FAILPOINT=list:FILE writes the names of the failpoints that it passes to a file.
 
 #include <signal.h>
 #include <unistd.h>

@@ -224,9 +224,10 @@ def disturb(place, clients, failpoints, num_kills, choices):
     """Lives of the server that end by kill -9. Returns how many kills there were of each kind."""
     kills = collections.Counter()
     kinds = failpoints + ["server", "worker", "worker", "worker"]
-    server = None
+    server, turn = None, 0
     while sum(kills.values()) < num_kills:
-        kind = kinds[sum(kills.values()) % len(kinds)]
+        kind = kinds[turn % len(kinds)]
+        turn += 1
         if kind in failpoints:
             if server:
                 server.kill()
@@ -260,8 +261,6 @@ def disturb(place, clients, failpoints, num_kills, choices):
                     kills[kind] += 1
                 except ProcessLookupError:
                     pass
-            else:
-                kills["nobody to kill"] += 0
     if server:
         server.kill()
     return kills

@@ -11,16 +11,23 @@
 #include <chrono>
 #include <utility>
 
+#include "server/service/tls_credentials.h"
+
 namespace radbake::service {
 namespace {
 
 constexpr int kPoolThreads = 4;
 constexpr std::size_t kTransportQuotaBytes = std::size_t{256} << 20;
 constexpr int kMaxSendBytes = 4 << 20;
-constexpr int kMaxStreamsPerConnection = 200;
 constexpr int kKeepaliveMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
 constexpr int kMinPingIntervalMs = 30'000;
+constexpr int kHandshakeLimitMs = 20'000;
+// Of connections from elsewhere: one without calls is closed, and none stays for ever, so that a client's certificate
+// is looked at again. Clients connect anew by themselves, and resume watches and transfers.
+constexpr int kMaxIdleMs = 10 * 60'000;
+constexpr int kMaxAgeMs = 60 * 60'000;
+constexpr int kAgeGraceMs = 5 * 60'000;
 constexpr std::chrono::seconds kShutdownGrace{2};
 const char* const kServiceNames[] = {"radbake.v1.Content", "radbake.v1.Bakes", "radbake.v1.Server"};
 
@@ -48,6 +55,10 @@ Result<std::unique_ptr<BakeServer>> BakeServer::start(BakeServerOptions options)
   options.queue.max_queued = static_cast<std::uint32_t>(options.limits.max_queued_bakes);
   options.queue.spool_folder = options.data / "spool";
   std::unique_ptr<BakeServer> server(new BakeServer());
+  // What the options say wrongly shows before anything is touched.
+  RADBAKE_ASSIGN_OR_RETURN(const access::ListenAddress where, access::resolve_listen_address(options.listen));
+  RADBAKE_RETURN_IF_ERROR(access::check_access(options.access, options.listen, where.is_local));
+  RADBAKE_ASSIGN_OR_RETURN(server->gate_, Gate::open(options.access));
   RADBAKE_RETURN_IF_ERROR(server->open_stores(options));
 
   server->queue_ = std::make_unique<jobs::JobQueue>(options.queue, *server->jobs_, *server->content_);
@@ -55,15 +66,16 @@ Result<std::unique_ptr<BakeServer>> BakeServer::start(BakeServerOptions options)
   server->costs_ = std::make_unique<CostFile>(options.costs.empty() ? options.data / "costs.txt" : options.costs);
   server->workers_service_ =
       std::make_unique<WorkersService>(*server->queue_, *server->pool_, *server->costs_, options.limits);
-  server->content_service_ = std::make_unique<ContentService>(*server->content_, *server->pool_, options.limits);
-  server->bakes_service_ = std::make_unique<BakesService>(*server->queue_, *server->content_, *server->pool_,
-                                                          options.limits, options.max_threads);
-  server->server_service_ = std::make_unique<ServerService>(options.limits);
+  server->content_service_ =
+      std::make_unique<ContentService>(*server->gate_, *server->content_, *server->pool_, options.limits);
+  server->bakes_service_ = std::make_unique<BakesService>(*server->gate_, *server->queue_, *server->content_,
+                                                          *server->pool_, options.limits, options.max_threads);
+  server->server_service_ = std::make_unique<ServerService>(*server->gate_, *server->pool_, options.limits);
 
   // Listen last: who can connect finds everything ready. Jobs of an earlier server begin to run before that.
   RADBAKE_RETURN_IF_ERROR(server->workers_service_->start());
   RADBAKE_RETURN_IF_ERROR(server->queue_->start(*server->workers_service_));
-  RADBAKE_RETURN_IF_ERROR(server->listen(options));
+  RADBAKE_RETURN_IF_ERROR(server->listen(options, where));
   return server;
 }
 
@@ -77,15 +89,17 @@ Result<void> BakeServer::open_stores(const BakeServerOptions& options) {
   return {};
 }
 
-Result<void> BakeServer::listen(const BakeServerOptions& options) {
+Result<void> BakeServer::listen(const BakeServerOptions& options, const access::ListenAddress& where) {
   // Never paid back: when the last gRPC object goes, the library stops its threads, and one that polls for a socket's
   // writes may be waited for as long as 10 s.
   grpc_init();
   grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  // It asks nobody who he is: only for this machine.
+  if (where.is_local) grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  RADBAKE_ASSIGN_OR_RETURN(credentials_, make_credentials(options.access));
   grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port);
+  using Connections = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
+  acceptor_ = builder.experimental().AddExternalConnectionAcceptor(Connections::FROM_FD, credentials_);
   builder.RegisterService(content_service_.get());
   builder.RegisterService(bakes_service_.get());
   builder.RegisterService(server_service_.get());
@@ -95,23 +109,28 @@ Result<void> BakeServer::listen(const BakeServerOptions& options) {
   // Reflection is the one service with a blocking implementation: two threads are enough for it.
   builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 2);
-  // Otherwise a second server on the same port would quietly take every other connection.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(options.limits.max_calls_per_connection));
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimitMs);
+  if (!where.is_local) {
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kMaxIdleMs);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, kMaxAgeMs);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, kAgeGraceMs);
+  }
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
   server_ = builder.BuildAndStart();
-  if (!server_ || port == 0) {
-    return Error{ErrorCode::kUnavailable, "cannot listen on '" + options.listen +
-                                              "': not an address of this machine (host:port or unix:PATH), or in use"};
-  }
-  address_ = options.listen;
-  if (!options.listen.starts_with("unix:")) {
-    address_ = options.listen.substr(0, options.listen.rfind(':')) + ":" + std::to_string(port);
-  }
+  if (!server_) return internal_error("gRPC does not start a server");
   set_health(*server_, true);
+  RADBAKE_ASSIGN_OR_RETURN(access::Listening listening, access::listen_on(where));
+  listener_ = std::make_unique<access::Listener>(
+      std::move(listening), options.limits.max_connections, [this](store::FileDescriptor connection) {
+        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+        parameters.fd = connection.release();
+        acceptor_->HandleNewConnection(&parameters);
+      });
   return {};
 }
 
@@ -128,6 +147,7 @@ void BakeServer::stop() {
   if (!server_) return;
   set_health(*server_, false);
   queue_->drain();
+  if (listener_) listener_->stop();
   server_->Shutdown(std::chrono::system_clock::now() + kShutdownGrace);
   workers_service_->stop();
 }

@@ -8,10 +8,13 @@
 
 #include "common/base/limits.h"
 #include "common/base/result.h"
+#include "server/access/access_options.h"
+#include "server/access/listener.h"
 #include "server/jobs/housekeeping.h"
 #include "server/jobs/job_queue.h"
 #include "server/service/bakes_service.h"
 #include "server/service/content_service.h"
+#include "server/service/gate.h"
 #include "server/service/server_service.h"
 #include "server/service/workers_service.h"
 #include "server/store/job_store.h"
@@ -24,6 +27,7 @@ struct BakeServerOptions {
   std::string listen = "127.0.0.1:7419";  ///< host:port (0: any) or unix:PATH
   std::filesystem::path data;             ///< everything that must survive lives here; one server at a time
   std::filesystem::path costs;            ///< what bakes cost on this host; empty: in the data folder
+  access::AccessOptions access;           ///< who may call
   jobs::HousekeepingOptions housekeeping;
   jobs::QueueOptions queue;  ///< its max_* and spool folder are set from here
   Limits limits;
@@ -33,13 +37,14 @@ struct BakeServerOptions {
 /// The whole server: stores, queue and services, listening. start() ... stop(), once.
 class BakeServer {
  public:
-  /// Errors: kFailedPrecondition for a data folder in use, kUnavailable for an address that cannot be listened on.
+  /// Errors: kFailedPrecondition for a data folder in use, kUnavailable for an address that cannot be listened on,
+  /// kInvalidArgument for an address that others can reach without proof of who they are.
   static Result<std::unique_ptr<BakeServer>> start(BakeServerOptions options);
   /// Stops.
   ~BakeServer();
 
   /// Where clients find it, with the port that was chosen.
-  const std::string& address() const { return address_; }
+  const std::string& address() const { return listener_->address(); }
 
   /// Refuses new work, queues running bakes for the next start, ends watches, and waits for calls to end.
   void stop();
@@ -47,7 +52,7 @@ class BakeServer {
  private:
   BakeServer() = default;
   Result<void> open_stores(const BakeServerOptions& options);
-  Result<void> listen(const BakeServerOptions& options);
+  Result<void> listen(const BakeServerOptions& options, const access::ListenAddress& where);
 
   store::FileDescriptor lock_;
   std::unique_ptr<store::TenantContent> content_;
@@ -56,12 +61,15 @@ class BakeServer {
   std::unique_ptr<jobs::JobQueue> queue_;
   std::unique_ptr<store::TaskPool> pool_;
   std::unique_ptr<CostFile> costs_;
+  std::unique_ptr<Gate> gate_;
   std::unique_ptr<WorkersService> workers_service_;
   std::unique_ptr<ContentService> content_service_;
   std::unique_ptr<BakesService> bakes_service_;
   std::unique_ptr<ServerService> server_service_;
+  std::shared_ptr<grpc::ServerCredentials> credentials_;  // used at each handshake: outlives the server
   std::unique_ptr<grpc::Server> server_;
-  std::string address_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
+  std::unique_ptr<access::Listener> listener_;
 };
 
 }  // namespace radbake::service

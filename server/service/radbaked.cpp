@@ -13,6 +13,7 @@
 
 #include "common/base/version.h"
 #include "common/log/log.h"
+#include "server/service/access_options.h"
 #include "server/service/bake_server.h"
 
 namespace radbake::service {
@@ -26,6 +27,7 @@ struct ProgramOptions {
   BakeServerOptions server;
   LogOptions log{"radbaked", "info", false};
   bool is_bound_to_parent = false;
+  bool hashes_token = false;
 };
 
 std::filesystem::path default_data_folder() {
@@ -64,6 +66,9 @@ void declare_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--max-running", server.limits.max_running_bakes, "Bakes at the same time")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  declare_access_options(app, server.access);
+  declare_call_limits(app, server.limits);
+  app.add_flag("--hash-token", options.hashes_token, "Read a token from stdin, print its hash for --tokens, and exit");
   app.add_flag("--log-json", options.log.is_json, "Log JSON lines instead of text");
   app.add_option("--log-level", options.log.level, "trace, debug, info, warning, error or off")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error", "off"}))
@@ -76,11 +81,13 @@ void declare_options(CLI::App& app, ProgramOptions& options) {
       "  radbaked                                     on 127.0.0.1:7419\n"
       "  radbaked --listen 127.0.0.1:0 --data /tmp/r  on a free port, which it prints\n"
       "  radbaked --listen unix:/run/radbake.sock --max-running 2 --threads 8 --log-json\n"
+      "  radbaked --listen 0.0.0.0:7419 --tls-cert server.pem --tls-key server.key --tls-client-ca clients.pem\n"
+      "  head -c 32 /dev/urandom | base64 | tee token | radbaked --hash-token   makes a token for --tokens\n"
       "\n"
       "Prints 'radbaked VERSION listening on ADDRESS' when it is ready; logs go to stderr. SIGTERM or Ctrl-C stops "
       "it:\n"
-      "running bakes go back to the queue and run again at the next start. There is no authentication: listen on the\n"
-      "loopback or put a proxy in front.");
+      "running bakes go back to the queue and run again at the next start. Where other machines can connect, --listen\n"
+      "needs TLS and certificates or tokens of clients; the files of both may change while it runs.");
 }
 
 /// Waits for SIGTERM or SIGINT, or with --exit-with-parent for the end of the parent.
@@ -150,6 +157,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& problem) {
     return app.exit(problem) == 0 ? 0 : kExitUsage;
   }
+  if (options.hashes_token) return print_token_hash();
   if (options.is_bound_to_parent) prctl(PR_SET_PDEATHSIG, SIGUSR1);
   return run(options, signals, parent);
 }

@@ -6,8 +6,10 @@
 
 #include "common/base/limits.h"
 #include "radbake/v1/content.pb.h"
-#include "server/store/content_store.h"
+#include "server/service/call_slots.h"
+#include "server/service/gate.h"
 #include "server/store/task_pool.h"
+#include "server/store/tenant_content.h"
 
 namespace radbake::service {
 
@@ -16,7 +18,7 @@ namespace radbake::service {
 /// read. Deletes itself.
 class UploadReactor : public grpc::ServerReadReactor<v1::UploadChunk> {
  public:
-  UploadReactor(const grpc::Status& admission, store::ContentStore& content, store::TaskPool& pool,
+  UploadReactor(const Admission& admission, CallSlots::Slot slot, store::TenantContent& content, store::TaskPool& pool,
                 const Limits& limits, v1::UploadResult* result);
 
   void OnReadDone(bool ok) override;
@@ -26,11 +28,16 @@ class UploadReactor : public grpc::ServerReadReactor<v1::UploadChunk> {
   /// Stores the chunk just read; the status to finish with, or none to read on.
   std::optional<grpc::Status> take_chunk();
 
-  store::ContentStore& content_;
+  void end(const grpc::Status& status);
+
+  CallSlots::Slot slot_;
+  store::TenantContent& content_;
+  const std::string tenant_;
   store::TaskPool& pool_;
   const Limits limits_;
   v1::UploadResult* const result_;
   v1::UploadChunk chunk_;
+  store::ContentStore* store_ = nullptr;  // the tenant's, from the first chunk on
   std::optional<Digest> digest_;
   std::uint64_t next_offset_ = 0;
 };

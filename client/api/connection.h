@@ -62,10 +62,10 @@ class Backoff {
   std::condition_variable_any wakeup_;
 };
 
-/// A context for one call: says the protocol's version, and is cancelled by the stop token.
+/// A context for one call: says the protocol's version and the token, and is cancelled by the stop token.
 class Call {
  public:
-  explicit Call(std::stop_token stop);
+  Call(const Connection& connection, std::stop_token stop);
   grpc::ClientContext& context() { return context_; }
   void set_deadline(std::chrono::milliseconds limit) {
     context_.set_deadline(std::chrono::system_clock::now() + limit);
@@ -98,7 +98,7 @@ Result<Response> call_with_retries(const Connection& connection, std::chrono::mi
                                    std::stop_token stop, UnaryCall call) {
   Backoff backoff(connection.options, connection.options.call_patience);
   while (true) {
-    Call attempt(stop);
+    Call attempt(connection, stop);
     attempt.set_deadline(deadline);
     Response response;
     const grpc::Status status = call(&attempt.context(), &response);

@@ -24,7 +24,7 @@ Result<std::string> Client::download(const Digest& digest, std::stop_token stop)
     request.mutable_digest()->set_sha256(digest.sha256);
     request.mutable_digest()->set_size_bytes(digest.size_bytes);
     request.set_offset(bytes.size());
-    Call call(stop);
+    Call call(*connection_, stop);
     const auto reader = connection_->content->Download(&call.context(), request);
     v1::DownloadChunk chunk;
     while (reader->Read(&chunk)) {

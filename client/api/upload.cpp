@@ -67,7 +67,7 @@ class Upload {
   }
 
   grpc::Status send(const std::function<void(std::uint64_t)>& on_sent) {
-    Call call(stop_);
+    Call call(connection_, stop_);
     v1::UploadResult result;
     const auto writer = connection_.content->Upload(&call.context(), &result);
     v1::UploadChunk chunk;

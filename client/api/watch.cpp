@@ -10,7 +10,7 @@ Result<v1::Bake> Client::watch(const std::string& name, const WatchOptions& opti
   request.set_include_tiles(options.include_tiles);
   Backoff backoff(connection_->options, connection_->options.stream_patience);
   while (true) {
-    Call call(stop);
+    Call call(*connection_, stop);
     const auto reader = connection_->bakes->WatchBake(&call.context(), request);
     v1::WatchBakeResponse response;
     while (reader->Read(&response)) {

@@ -10,6 +10,7 @@ namespace {
 
 api::ClientOptions client_options(const CommandLine& line) {
   api::ClientOptions options;
+  options.security = line.security;
   options.plan_deadline = std::chrono::milliseconds(std::llround(1000 * line.plan_seconds));
   return options;
 }

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <grpc/grpc.h>
+#include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
@@ -41,6 +42,9 @@ Result<store::FileDescriptor> lock_folder(const std::filesystem::path& folder) {
   }
   return file;
 }
+
+/// What gRPC logs, as lines of our own log. Most of it is what peers do wrong: no error of this server.
+void log_of_grpc(gpr_log_func_args* line) { spdlog::warn("gRPC: {}", line->message); }
 
 void set_health(grpc::Server& server, bool is_serving) {
   grpc::HealthCheckServiceInterface* health = server.GetHealthCheckService();
@@ -93,6 +97,7 @@ Result<void> BakeServer::listen(const BakeServerOptions& options, const access::
   // Never paid back: when the last gRPC object goes, the library stops its threads, and one that polls for a socket's
   // writes may be waited for as long as 10 s.
   grpc_init();
+  gpr_set_log_function(&log_of_grpc);
   grpc::EnableDefaultHealthCheckService(true);
   // It asks nobody who he is: only for this machine.
   if (where.is_local) grpc::reflection::InitProtoReflectionServerBuilderPlugin();

@@ -1,7 +1,6 @@
 #include "tests/service/test_server.h"
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <atomic>
 #include <thread>
@@ -9,17 +8,6 @@
 #include "radbake/v1/scene.pb.h"
 
 namespace radbake::testing {
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "rbtest-XXXXXX").string();
-  EXPECT_NE(mkdtemp(name.data()), nullptr);
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 std::unique_ptr<grpc::ClientContext> new_context(const std::string& protocol) {
   auto context = std::make_unique<grpc::ClientContext>();

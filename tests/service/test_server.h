@@ -16,19 +16,9 @@
 #include "radbake/v1/server.grpc.pb.h"
 #include "server/service/bake_server.h"
 #include "tests/service/fake_worker.h"
+#include "tests/service/temporary_folder.h"
 
 namespace radbake::testing {
-
-/// A folder that is removed at the end, short enough for a Unix socket's path.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// No call of a test waits longer: a failure then, where it would hang.
 inline constexpr std::chrono::seconds kCallLimit{60};

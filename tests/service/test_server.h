@@ -25,7 +25,10 @@ inline constexpr std::chrono::seconds kCallLimit{60};
 
 /// Everything that a client does, over the generated stubs.
 struct TestClient {
-  explicit TestClient(const std::string& address);
+  /// token: sent with each call, over whatever the credentials speak.
+  explicit TestClient(
+      const std::string& address, const std::string& token = "",
+      const std::shared_ptr<grpc::ChannelCredentials>& credentials = grpc::InsecureChannelCredentials());
 
   std::unique_ptr<v1::Content::Stub> content;
   std::unique_ptr<v1::Bakes::Stub> bakes;
@@ -68,7 +71,7 @@ class TestServer {
 
   explicit TestServer(const service::BakeServerOptions& options);
 
-  TestClient client() const { return TestClient(server_->address()); }
+  TestClient client(const std::string& token = "") const { return TestClient(server_->address(), token); }
   service::BakeServer& server() { return *server_; }
 
  private:

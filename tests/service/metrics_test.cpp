@@ -161,8 +161,7 @@ TEST_F(MetricsTest, LetsNoClientInventALabel) {
 TEST_F(MetricsTest, CountsBytesOfUploadsThatAreNotComplete) {
   const std::string bytes(3000, 'u');
   const auto context = new_context();
-  v1::UploadResult result;
-  const auto stream = client_.content->Upload(context.get(), &result);
+  const auto stream = client_.content->Upload(context.get());
   v1::UploadChunk chunk;
   *chunk.mutable_digest() = digest_message(bytes);
   chunk.set_data(bytes.substr(0, 1000));
@@ -172,8 +171,7 @@ TEST_F(MetricsTest, CountsBytesOfUploadsThatAreNotComplete) {
   chunk.set_data(bytes.substr(1000));
   chunk.set_finish(true);
   stream->Write(chunk);
-  stream->WritesDone();
-  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_TRUE(finish_upload(*stream).ok());
   EXPECT_EQ(value("radbake_upload_bytes"), 0);
 }
 

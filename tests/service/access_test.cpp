@@ -89,6 +89,7 @@ class AccessTest : public ::testing::Test {
 TEST_F(AccessTest, AsksWhoCallsInEveryMethod) {
   const TestClient stranger = server_->client();
   for (const std::string& method : all_methods()) {
+    fprintf(stderr,"DBG %s %ld\n",method.c_str(),(long)time(nullptr));
     EXPECT_EQ(call(stranger, method).error_code(), grpc::UNAUTHENTICATED) << method;
     EXPECT_EQ(call(stranger, method, {"Bearer " + kNew}).error_code(), grpc::UNAUTHENTICATED) << method;
     // Who is known gets further: to what is wrong with an empty message.

@@ -39,6 +39,15 @@ class ConnectionsTest : public ::testing::Test {
       *chunk.mutable_digest() = digest_message("never whole");
       chunk.set_data("nev");
       stream->Write(chunk);
+      // It has begun when its first bytes are there.
+      v1::QueryUploadRequest query;
+      *query.mutable_digest() = chunk.digest();
+      v1::QueryUploadResponse answer;
+      const auto limit = std::chrono::steady_clock::now() + kCallLimit;
+      while (answer.committed_bytes() == 0 && std::chrono::steady_clock::now() < limit) {
+        EXPECT_TRUE(client.content->QueryUpload(new_context().get(), query, &answer).ok());
+      }
+      EXPECT_EQ(answer.committed_bytes(), 3u);
     }
     std::unique_ptr<grpc::ClientContext> context;
     std::unique_ptr<UploadStream> stream;

@@ -118,6 +118,24 @@ TEST(Health, IsNotServingWhenTheDiskCannotBeLookedAt) {
   EXPECT_TRUE(becomes(client, Health::kServing));
 }
 
+TEST(Health, SaysWhatTheDiskRefusedUntilItTakesItAgain) {
+  const TemporaryFolder folder;
+  std::atomic<bool> is_refusing = true;
+  service::Readiness readiness;
+  readiness.clear(service::Obstacle::kRecovering);
+  service::DiskWatchOptions options;
+  options.folder = folder.path();
+  options.interval = std::chrono::milliseconds(1);
+  options.problem = [&] { return is_refusing ? std::string("fsync: Input/output error") : std::string(); };
+  const service::DiskWatch watch(options, readiness);
+  EXPECT_EQ(readiness.why_not(), "disk_refuses: fsync: Input/output error\n");
+  EXPECT_TRUE(watch.admit().ok());
+  is_refusing = false;
+  const auto limit = std::chrono::steady_clock::now() + kCallLimit;
+  while (!readiness.is_ready() && std::chrono::steady_clock::now() < limit) std::this_thread::yield();
+  EXPECT_TRUE(readiness.is_ready());
+}
+
 /// A file system of its own with few bytes.
 class SmallDisk {
  public:

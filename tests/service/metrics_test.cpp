@@ -87,6 +87,24 @@ TEST_F(MetricsTest, CountsABakeItsStagesAndItsRays) {
   EXPECT_EQ(metric(text, "radbake_last_bake_rays_per_second"), kFakeRaysPerSecond);
 }
 
+TEST_F(MetricsTest, CountsSubmitsThatAnotherBakeAnswers) {
+  const std::string hits = "radbake_cache_lookups_total{result=\"hit\"}";
+  const std::string misses = "radbake_cache_lookups_total{result=\"miss\"}";
+  const std::string name = client_.submit(kSucceed).name();
+  EXPECT_EQ(client_.watch(name).finished().state(), v1::SUCCEEDED);
+  EXPECT_EQ(value(hits), 0);
+  EXPECT_EQ(value(misses), 1);
+  // Done: answered from the store, and no bake more has run.
+  client_.submit(kSucceed);
+  EXPECT_EQ(value(hits), 1);
+  EXPECT_EQ(value("radbake_bakes_ended_total{state=\"succeeded\"}"), 1);
+  // Under way: shares the run.
+  client_.submit(kRunUntilCancelled);
+  client_.submit(kRunUntilCancelled);
+  EXPECT_EQ(value(hits), 2);
+  EXPECT_EQ(value(misses), 2);
+}
+
 TEST_F(MetricsTest, CountsWorkersThatDieAndBakesThatWereCancelled) {
   EXPECT_EQ(client_.watch(client_.submit(kCrash).name()).finished().state(), v1::FAILED);
   EXPECT_TRUE(becomes("radbake_attempts_ended_total{reason=\"worker_died\"}", 3));  // it is tried again

@@ -86,34 +86,23 @@ grpc::Status check_counts(const v1::SceneManifest& manifest, const Limits& limit
 
 }  // namespace
 
-grpc::Status check_scene(const SceneRequest& request, const Limits& limits, std::uint32_t max_threads,
-                         const store::ContentStore& content, store::Work& work) {
-  if (auto status = check_settings(request.settings, request.run, limits); !status.ok()) return status;
-
-  // Read the manifest.
-  const Digest digest = from_message(request.manifest);
-  if (auto valid = validate_sha256(digest.sha256); !valid.ok()) return bad_field("manifest", valid.error().message);
-  if (digest.size_bytes > limits.max_manifest_bytes) {
-    return above_limit("max_manifest_bytes", digest.size_bytes, limits.max_manifest_bytes);
-  }
-  if (!content.contains(digest)) return missing_blobs({digest});
-  const auto bytes = content.read_blob(digest);
-  if (!bytes.ok()) return to_status(bytes.error());
+grpc::Status check_manifest(const std::string& bytes, const Digest& digest, const Limits& limits,
+                            std::vector<Digest>& inputs) {
   v1::SceneManifest manifest;
-  if (!manifest.ParseFromString(*bytes)) {
+  if (!manifest.ParseFromString(bytes)) {
     return bad_field("manifest", "blob " + digest.sha256 + " is not a SceneManifest");
   }
   if (auto status = check_counts(manifest, limits); !status.ok()) return status;
 
   // Every blob once, the manifest first.
   std::set<Digest> known = {digest};
-  work.inputs = {digest};
+  inputs = {digest};
   const auto add = [&](const v1::Digest& message, const std::string& name) {
     Digest blob = from_message(message);
     if (auto valid = validate_sha256(blob.sha256); !valid.ok()) {
       return bad_field("manifest", name + ": " + valid.error().message);
     }
-    if (known.insert(blob).second) work.inputs.push_back(std::move(blob));
+    if (known.insert(blob).second) inputs.push_back(std::move(blob));
     return grpc::Status::OK;
   };
   for (const v1::MeshRecord& mesh : manifest.meshes()) {
@@ -127,6 +116,23 @@ grpc::Status check_scene(const SceneRequest& request, const Limits& limits, std:
     const v1::Environment& sky = manifest.environment();
     if (auto status = add(sky.blob(), "environment '" + sky.name().substr(0, 100) + "'"); !status.ok()) return status;
   }
+  return grpc::Status::OK;
+}
+
+grpc::Status check_scene(const SceneRequest& request, const Limits& limits, std::uint32_t max_threads,
+                         const store::ContentStore& content, store::Work& work) {
+  if (auto status = check_settings(request.settings, request.run, limits); !status.ok()) return status;
+
+  // Read the manifest.
+  const Digest digest = from_message(request.manifest);
+  if (auto valid = validate_sha256(digest.sha256); !valid.ok()) return bad_field("manifest", valid.error().message);
+  if (digest.size_bytes > limits.max_manifest_bytes) {
+    return above_limit("max_manifest_bytes", digest.size_bytes, limits.max_manifest_bytes);
+  }
+  if (!content.contains(digest)) return missing_blobs({digest});
+  const auto bytes = content.read_blob(digest);
+  if (!bytes.ok()) return to_status(bytes.error());
+  if (auto status = check_manifest(*bytes, digest, limits, work.inputs); !status.ok()) return status;
   const std::vector<Digest> missing = content.find_missing(work.inputs);
   if (!missing.empty()) return missing_blobs(missing);
 

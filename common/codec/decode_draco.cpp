@@ -1,0 +1,78 @@
+#include "common/codec/decode_draco.h"
+
+#include <draco/compression/config/decoder_options.h>
+#include <draco/compression/decode.h>
+#include <draco/compression/mesh/mesh_edgebreaker_decoder.h>
+#include <draco/compression/mesh/mesh_sequential_decoder.h>
+
+#include <exception>
+#include <new>
+#include <optional>
+
+namespace radbake {
+namespace {
+
+/// Holds the attributes that a blob has declared against those that it must have.
+std::optional<Error> find_problem(const draco::PointCloud& declared, std::span<const ExpectedAttribute> expected) {
+  if (declared.num_attributes() != static_cast<int>(expected.size())) {
+    return invalid_argument("has " + std::to_string(declared.num_attributes()) + " attributes, its record says " +
+                            std::to_string(expected.size()));
+  }
+  for (const ExpectedAttribute& wanted : expected) {
+    const draco::PointAttribute* found = declared.GetAttributeByUniqueId(wanted.unique_id);
+    if (found != nullptr && found->attribute_type() == wanted.type && found->data_type() == wanted.data_type &&
+        found->num_components() == wanted.num_components) {
+      continue;
+    }
+    return invalid_argument(std::string("has no attribute ") + wanted.name + " of the right type");
+  }
+  return std::nullopt;
+}
+
+/// One of Draco's decoders that looks at the attributes when it knows what they are and has decoded none.
+template <typename Decoder>
+class CheckingDecoder : public Decoder {
+ public:
+  explicit CheckingDecoder(std::span<const ExpectedAttribute> expected) : expected_(expected) {}
+  const std::optional<Error>& problem() const { return problem_; }
+
+ protected:
+  bool DecodeAllAttributes() override {
+    problem_ = find_problem(*this->point_cloud(), expected_);
+    return !problem_ && Decoder::DecodeAllAttributes();
+  }
+
+ private:
+  const std::span<const ExpectedAttribute> expected_;
+  std::optional<Error> problem_;
+};
+
+template <typename Decoder>
+Result<std::unique_ptr<draco::Mesh>> decode_by(const std::string& blob, std::span<const ExpectedAttribute> expected) {
+  draco::DecoderBuffer buffer;
+  buffer.Init(blob.data(), blob.size());
+  auto mesh = std::make_unique<draco::Mesh>();
+  CheckingDecoder<Decoder> decoder(expected);
+  const draco::Status status = decoder.Decode(draco::DecoderOptions(), &buffer, mesh.get());
+  if (decoder.problem()) return *decoder.problem();
+  if (!status.ok()) return invalid_argument("does not decode: " + status.error_msg_string());
+  return mesh;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<draco::Mesh>> decode_draco(const std::string& blob,
+                                                  std::span<const ExpectedAttribute> attributes) {
+  try {
+    constexpr std::size_t kMethodAt = 8;
+    const bool is_sequential = blob.size() > kMethodAt && blob[kMethodAt] == draco::MESH_SEQUENTIAL_ENCODING;
+    return is_sequential ? decode_by<draco::MeshSequentialDecoder>(blob, attributes)
+                         : decode_by<draco::MeshEdgebreakerDecoder>(blob, attributes);
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kResourceExhausted, "needs more memory to decode than there is"};
+  } catch (const std::exception& exception) {
+    return invalid_argument(std::string("does not decode: ") + exception.what());
+  }
+}
+
+}  // namespace radbake

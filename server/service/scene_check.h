@@ -20,8 +20,8 @@ struct SceneRequest {
   const v1::RunOptions& run;
 };
 
-/// Checks the bytes of a manifest: readable, its counts within the limits, digests well formed. Takes memory for the
-/// message alone. `inputs`: every blob that it names once, itself (its own digest) first.
+/// Checks the bytes of a manifest: readable, its counts within the limits, digests well formed. Counts records before
+/// it takes memory for them. `inputs`: every blob that it names once, itself (its own digest) first.
 grpc::Status check_manifest(const std::string& bytes, const Digest& digest, const Limits& limits,
                             std::vector<Digest>& inputs);
 

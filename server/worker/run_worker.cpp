@@ -2,6 +2,7 @@
 
 #include <grpc/grpc.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +15,7 @@
 
 #include "common/base/digest.h"
 #include "common/base/limits.h"
+#include "common/base/shortened.h"
 #include "common/base/version.h"
 #include "common/codec/scene_codec.h"
 #include "server/settings/to_options.h"
@@ -203,12 +205,20 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   return finished;
 }
 
+Error out_of_memory() {
+  rlimit limit{};
+  const bool is_limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  return {ErrorCode::kResourceExhausted,
+          "the bake needs more memory than " +
+              (is_limited ? "its limit of " + std::to_string(limit.rlim_cur >> 20) + " MiB" : "there is")};
+}
+
 /// Does the work; nothing that it throws gets further.
 Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
   try {
     return start.plan_only() ? plan(start, identity, stream) : bake(start, identity, stream);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kResourceExhausted, "the bake needs more memory than its worker may use"};
+    return out_of_memory();
   } catch (const std::exception& exception) {
     return internal_error(std::string("the worker failed: ") + exception.what());
   }
@@ -239,7 +249,7 @@ int run_worker(const std::shared_ptr<grpc::Channel>& channel, const WorkerIdenti
   } else if (done.error().code == ErrorCode::kCancelled) {
     *outcome.mutable_cancelled() = to_message(done.error());
   } else {
-    spdlog::warn("{} attempt {} failed: {}", identity.job, identity.attempt, done.error().message);
+    spdlog::warn("{} attempt {} failed: {}", identity.job, identity.attempt, shortened(done.error().message));
     *outcome.mutable_failed() = to_message(done.error());
   }
   if (!stream.finish(std::move(outcome))) {

@@ -1,10 +1,8 @@
 // The real server program: start, stop, signals, and what survives kill -9.
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,67 +11,13 @@
 #include <thread>
 
 #include "common/base/version.h"
+#include "tests/service/program.h"
 #include "tests/service/test_server.h"
 
 namespace radbake::testing {
 namespace {
 
 using ::testing::HasSubstr;
-
-/// A radbaked that is killed at the end if it still runs.
-class Program {
- public:
-  explicit Program(std::vector<std::string> arguments) {
-    int ends[2];
-    EXPECT_EQ(pipe2(ends, O_CLOEXEC), 0);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-    arguments.insert(arguments.begin(), RADBAKE_RADBAKED);
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    EXPECT_EQ(posix_spawn(&pid_, RADBAKE_RADBAKED, &actions, nullptr, argv.data(), environ), 0);
-    posix_spawn_file_actions_destroy(&actions);
-    close(ends[1]);
-    output_ = fdopen(ends[0], "r");
-  }
-  ~Program() {
-    if (pid_ > 0) end(SIGKILL);
-    fclose(output_);
-  }
-
-  /// Reads to the line that says where it listens; "" if it ends before.
-  std::string wait_for_address() {
-    char line[4096];
-    const std::string start = std::string("radbaked ") + kEngineVersion + " listening on ";
-    while (fgets(line, sizeof(line), output_)) {
-      output_text_ += line;
-      const std::string text = line;
-      if (text.starts_with(start)) return text.substr(start.size(), text.size() - start.size() - 1);
-    }
-    return "";
-  }
-
-  int wait() {
-    char line[4096];
-    while (fgets(line, sizeof(line), output_)) output_text_ += line;
-    int status = 0;
-    waitpid(std::exchange(pid_, 0), &status, 0);
-    return status;
-  }
-  int end(int signal) {
-    kill(pid_, signal);
-    return wait();
-  }
-  const std::string& output() const { return output_text_; }
-
- private:
-  pid_t pid_ = 0;
-  FILE* output_ = nullptr;
-  std::string output_text_;
-};
 
 class RadbakedTest : public ::testing::Test {
  protected:

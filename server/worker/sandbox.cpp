@@ -9,7 +9,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -78,6 +81,15 @@ Error refused(const std::string& what, int error) {
   return internal_error("the worker's sandbox: " + what + ": " + std::generic_category().message(error));
 }
 
+rlim_t highest_descriptor() {
+  rlim_t highest = 0;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
+    highest = std::max<rlim_t>(highest, std::strtoul(entry.path().filename().c_str(), nullptr, 10));
+  }
+  return highest;
+}
+
 /// Builds the filter and puts it on all threads; 0 or a negative errno.
 int load_filter() {
   const std::unique_ptr<std::remove_pointer_t<scmp_filter_ctx>, decltype(&seccomp_release)> filter(
@@ -122,6 +134,14 @@ Result<void> enter_sandbox() {
   ::signal(SIGXFSZ, SIG_IGN);
   const rlimit nothing{0, 0};
   if (::setrlimit(RLIMIT_FSIZE, &nothing) != 0) return refused("a limit of 0 on the size of files", errno);
+  // Room beside what is open for gRPC's own and for the inputs of a job that is handed over.
+  constexpr rlim_t kMoreDescriptors = 512;
+  const rlim_t most = highest_descriptor() + kMoreDescriptors;
+  rlimit open{};
+  if (::getrlimit(RLIMIT_NOFILE, &open) == 0 && most < open.rlim_max) {
+    open = {most, most};
+    if (::setrlimit(RLIMIT_NOFILE, &open) != 0) return refused("a limit on open descriptors", errno);
+  }
   if (!filters_system_calls()) return {};
   if (const int problem = load_filter(); problem != 0) return refused("the filter of system calls", -problem);
   return {};

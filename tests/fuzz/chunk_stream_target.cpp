@@ -16,7 +16,7 @@ namespace {
 using namespace radbake;  // NOLINT(google-build-using-namespace)
 
 constexpr std::uint64_t kMaxBlobBytes = 1000;
-constexpr int kMaxOperations = 200;
+constexpr int kMaxOperations = 60;
 
 /// What clients may upload: good bytes of several sizes, and digests that promise what no bytes keep.
 struct KnownBlob {

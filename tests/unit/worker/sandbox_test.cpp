@@ -91,6 +91,16 @@ TEST_F(Sandbox, LetsNoOpenFileGrow) {
   fclose(file);
 }
 
+TEST_F(Sandbox, LetsDescriptorsNotGrowWithoutEnd) {
+  EXPECT_EQ(end_of([] {
+              for (int i = 0; i < 5000; ++i) {
+                if (dup(0) < 0) return errno == EMFILE && i > 200 ? kDone : 1;
+              }
+              return 2;
+            }),
+            kDone);
+}
+
 TEST_F(Sandbox, EndsWhatReachesForOtherProcesses) {
   EXPECT_EQ(end_of([] { return kill(getppid(), 0) == 0 ? 1 : 2; }), -SIGSYS);
   EXPECT_EQ(end_of([] { return ptrace(PTRACE_ATTACH, getppid(), nullptr, nullptr) == 0 ? 1 : 2; }), -SIGSYS);

@@ -11,6 +11,7 @@
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "server/handover/handover.h"
+#include "server/worker/memory_limit.h"
 #include "server/worker/run_worker.h"
 #include "server/worker/sandbox.h"
 
@@ -48,6 +49,7 @@ int main(int argc, char** argv) {
   grpc_init();
   worker::seconds_since_process_start();
   digest_of("");
+  worker::name_lack_of_memory_at_the_end();
   // Before there is anything of a client's.
   if (const auto isolated = worker::enter_sandbox(); !isolated.ok()) spdlog::warn("{}", isolated.error().message);
   double waited_seconds = 0;

@@ -2,13 +2,11 @@
 
 #include <grpc/grpc.h>
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
 #include <exception>
 #include <functional>
-#include <new>
 #include <span>
 #include <thread>
 #include <utility>
@@ -20,6 +18,7 @@
 #include "common/codec/scene_codec.h"
 #include "server/settings/to_options.h"
 #include "server/worker/input_blobs.h"
+#include "server/worker/memory_limit.h"
 #include "server/worker/report_stream.h"
 #include "server/worker/result_messages.h"
 #include "server/worker/status_message.h"
@@ -205,21 +204,12 @@ Result<v1::WorkerReport> bake(const v1::StartWork& start, const WorkerIdentity& 
   return finished;
 }
 
-Error out_of_memory() {
-  rlimit limit{};
-  const bool is_limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
-  return {ErrorCode::kResourceExhausted,
-          "the bake needs more memory than " +
-              (is_limited ? "its limit of " + std::to_string(limit.rlim_cur >> 20) + " MiB" : "there is")};
-}
-
 /// Does the work; nothing that it throws gets further.
 Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& identity, ReportStream& stream) {
   try {
     return start.plan_only() ? plan(start, identity, stream) : bake(start, identity, stream);
-  } catch (const std::bad_alloc&) {
-    return out_of_memory();
   } catch (const std::exception& exception) {
+    if (is_lack_of_memory(exception)) return out_of_memory();
     return internal_error(std::string("the worker failed: ") + exception.what());
   }
 }

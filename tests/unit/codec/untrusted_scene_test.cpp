@@ -1,3 +1,5 @@
+#include <draco/compression/decode.h>
+#include <draco/compression/encode.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/stubs/logging.h>
 #include <gtest/gtest.h>
@@ -146,6 +148,32 @@ TEST(UntrustedScene, HoldsAttributesAgainstTheRecordBeforeItDecodesThem) {
   manifest.mutable_meshes(0)->set_has_normals(false);
   encoded.blobs.back().bytes = manifest.SerializeAsString();
   EXPECT_THAT(message_of(decode_encoded(encoded)), HasSubstr("mesh 'sheet#0' has 5 attributes, its record says 4"));
+}
+
+TEST(UntrustedScene, RefusesTextureCoordinatesThatArePredictedByPositions) {
+  // The same mesh encoded anew, as a stranger may: Draco takes its word for the length of such a prediction.
+  EncodedScene encoded = *encode_scene(sheet_scene(), {});
+  const auto encode_again = [&](int speed) {
+    draco::DecoderBuffer sheet;
+    sheet.Init(encoded.blobs[0].bytes.data(), encoded.blobs[0].bytes.size());
+    const auto mesh = std::move(draco::Decoder().DecodeMeshFromBuffer(&sheet)).value();
+    draco::Encoder encoder;
+    encoder.SetSpeedOptions(speed, speed);
+    for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::TEX_COORD}) {
+      encoder.SetAttributeQuantization(type, 12);
+    }
+    draco::EncoderBuffer buffer;
+    EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+    EncodedScene changed = encoded;
+    changed.blobs[0].bytes.assign(buffer.data(), buffer.size());
+    changed.blobs[0].digest.size_bytes = buffer.size();
+    v1::SceneManifest manifest = manifest_of(encoded);
+    manifest.mutable_meshes(0)->mutable_blob()->set_size_bytes(buffer.size());
+    changed.blobs.back().bytes = manifest.SerializeAsString();
+    return message_of(decode_encoded(changed));
+  };
+  EXPECT_EQ(encode_again(5), "decoded");
+  EXPECT_THAT(encode_again(0), HasSubstr("mesh 'sheet#0' does not decode"));
 }
 
 TEST(UntrustedScene, RefusesATextureCoordinateThatIsNotThere) {

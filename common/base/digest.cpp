@@ -6,6 +6,7 @@
 #include <array>
 
 #include "common/base/check.h"
+#include "common/base/shortened.h"
 
 namespace radbake {
 
@@ -50,7 +51,7 @@ Result<void> validate_sha256(const std::string& sha256) {
   const bool is_hex = std::all_of(sha256.begin(), sha256.end(),
                                   [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
   if (sha256.size() == 64 && is_hex) return {};
-  return invalid_argument("'" + sha256.substr(0, 80) + "' is not a SHA-256 digest (64 lower-case hexadecimal digits)");
+  return invalid_argument("'" + shortened(sha256, 80) + "' is not a SHA-256 digest (64 lower-case hexadecimal digits)");
 }
 
 }  // namespace radbake

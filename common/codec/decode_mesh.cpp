@@ -1,11 +1,7 @@
-#include <draco/compression/decode.h>
-
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <memory>
-#include <new>
 
+#include "common/codec/decode_draco.h"
 #include "common/codec/draco_peek.h"
 #include "common/codec/mesh_codec.h"
 
@@ -41,28 +37,23 @@ Result<void> check_claims(const std::string& blob, const v1::MeshRecord& record)
   return {};
 }
 
-Result<std::unique_ptr<draco::Mesh>> decode(const std::string& blob) {
-  try {
-    draco::DecoderBuffer buffer;
-    buffer.Init(blob.data(), blob.size());
-    auto decoded = draco::Decoder().DecodeMeshFromBuffer(&buffer);
-    if (!decoded.ok()) return invalid_argument("does not decode: " + decoded.status().error_msg_string());
-    return std::move(decoded).value();
-  } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kResourceExhausted, "needs more memory to decode than there is"};
-  } catch (const std::exception& exception) {
-    return invalid_argument(std::string("does not decode: ") + exception.what());
-  }
+/// What a mesh of this record has, in this order: the vertex id and the position first.
+std::vector<ExpectedAttribute> expected_attributes(const v1::MeshRecord& record) {
+  std::vector<ExpectedAttribute> expected = {
+      {kVertexId, Type::GENERIC, draco::DT_UINT32, 1, "vertex id"},
+      {kPositionId, Type::POSITION, draco::DT_FLOAT32, 3, "position"},
+  };
+  if (record.has_normals()) expected.push_back({kNormalId, Type::NORMAL, draco::DT_FLOAT32, 3, "normal"});
+  if (record.has_texcoord0()) expected.push_back({kTexcoord0Id, Type::TEX_COORD, draco::DT_FLOAT32, 2, "texcoord 0"});
+  if (record.has_texcoord1()) expected.push_back({kTexcoord1Id, Type::TEX_COORD, draco::DT_FLOAT32, 2, "texcoord 1"});
+  if (record.has_colors()) expected.push_back({kColorId, Type::COLOR, draco::DT_FLOAT32, 3, "colour"});
+  return expected;
 }
 
-/// The attribute of an id, of exactly this kind and with a value for every point.
-Result<const draco::PointAttribute*> attribute_of(const draco::Mesh& decoded, std::uint32_t unique_id, Type::Type type,
-                                                  draco::DataType data_type, int num_components, const char* name) {
+/// The attribute of an id, which is there, with a value for every point.
+Result<const draco::PointAttribute*> attribute_of(const draco::Mesh& decoded, std::uint32_t unique_id,
+                                                  const char* name) {
   const draco::PointAttribute* attribute = decoded.GetAttributeByUniqueId(unique_id);
-  if (attribute == nullptr || attribute->attribute_type() != type || attribute->data_type() != data_type ||
-      attribute->num_components() != num_components) {
-    return invalid_argument(std::string("has no attribute ") + name + " of the right type");
-  }
   for (std::uint32_t point = 0; point < decoded.num_points(); ++point) {
     if (attribute->mapped_index(draco::PointIndex(point)).value() >= attribute->size()) {
       return invalid_argument(std::string("has no ") + name + " for point " + std::to_string(point));
@@ -86,36 +77,26 @@ struct FloatAttribute {
   }
 };
 
-Result<FloatAttribute> float_attribute(const draco::Mesh& decoded, bool is_declared, std::uint32_t id, Type::Type type,
-                                       int num_components, const char* name) {
+Result<FloatAttribute> float_attribute(const draco::Mesh& decoded, bool is_declared, std::uint32_t id,
+                                       const char* name) {
   if (!is_declared) return FloatAttribute{};
-  RADBAKE_ASSIGN_OR_RETURN(const auto* attribute,
-                           attribute_of(decoded, id, type, draco::DT_FLOAT32, num_components, name));
+  RADBAKE_ASSIGN_OR_RETURN(const auto* attribute, attribute_of(decoded, id, name));
   return FloatAttribute{attribute, name};
 }
 
 Result<Mesh> read(const draco::Mesh& decoded, const v1::MeshRecord& record, Vec3 origin) {
-  // Check counts and attributes.
+  // Check the counts and that every point has every value.
   if (decoded.num_faces() != record.num_triangles()) {
     return invalid_argument(in_words(decoded.num_faces(), "triangles after decoding", record.num_triangles()));
   }
-  const int num_attributes =
-      2 + record.has_normals() + record.has_texcoord0() + record.has_texcoord1() + record.has_colors();
-  if (decoded.num_attributes() != num_attributes) {
-    return invalid_argument(in_words(decoded.num_attributes(), "attributes", num_attributes));
-  }
-  RADBAKE_ASSIGN_OR_RETURN(const auto* ids,
-                           attribute_of(decoded, kVertexId, Type::GENERIC, draco::DT_UINT32, 1, "vertex id"));
-  RADBAKE_ASSIGN_OR_RETURN(const auto position,
-                           float_attribute(decoded, true, kPositionId, Type::POSITION, 3, "position"));
-  RADBAKE_ASSIGN_OR_RETURN(const auto normal,
-                           float_attribute(decoded, record.has_normals(), kNormalId, Type::NORMAL, 3, "normal"));
-  RADBAKE_ASSIGN_OR_RETURN(const auto texcoord0, float_attribute(decoded, record.has_texcoord0(), kTexcoord0Id,
-                                                                 Type::TEX_COORD, 2, "texcoord 0"));
-  RADBAKE_ASSIGN_OR_RETURN(const auto texcoord1, float_attribute(decoded, record.has_texcoord1(), kTexcoord1Id,
-                                                                 Type::TEX_COORD, 2, "texcoord 1"));
-  RADBAKE_ASSIGN_OR_RETURN(const auto color,
-                           float_attribute(decoded, record.has_colors(), kColorId, Type::COLOR, 3, "colour"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto* ids, attribute_of(decoded, kVertexId, "vertex id"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto position, float_attribute(decoded, true, kPositionId, "position"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto normal, float_attribute(decoded, record.has_normals(), kNormalId, "normal"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto texcoord0,
+                           float_attribute(decoded, record.has_texcoord0(), kTexcoord0Id, "texcoord 0"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto texcoord1,
+                           float_attribute(decoded, record.has_texcoord1(), kTexcoord1Id, "texcoord 1"));
+  RADBAKE_ASSIGN_OR_RETURN(const auto color, float_attribute(decoded, record.has_colors(), kColorId, "colour"));
 
   // Put every point back to its vertex.
   const std::uint32_t num_vertices = record.num_vertices();
@@ -187,7 +168,7 @@ Result<Mesh> decode_mesh(const std::string& blob, const v1::MeshRecord& record, 
     return Error{error.code, "mesh '" + record.name() + "' " + error.message};
   };
   if (auto checked = check_claims(blob, record); !checked.ok()) return named(checked.error());
-  auto decoded = decode(blob);
+  auto decoded = decode_draco(blob, expected_attributes(record));
   if (!decoded.ok()) return named(decoded.error());
   auto mesh = read(**decoded, record, origin);
   if (!mesh.ok()) return named(mesh.error());

@@ -21,6 +21,8 @@ Result<void> check_limit(std::uint64_t count, const char* what, std::uint64_t li
 Result<void> check_counts(const v1::SceneManifest& manifest, const v1::Limits& limits) {
   if (manifest.meshes().empty()) return invalid_argument("the scene has no mesh");
   RADBAKE_RETURN_IF_ERROR(check_limit(manifest.meshes_size(), "meshes", limits.max_meshes(), "max_meshes"));
+  // A mesh has one material: more are of no use.
+  RADBAKE_RETURN_IF_ERROR(check_limit(manifest.materials_size(), "materials", limits.max_meshes(), "max_meshes"));
   RADBAKE_RETURN_IF_ERROR(check_limit(manifest.textures_size(), "textures", limits.max_textures(), "max_textures"));
   RADBAKE_RETURN_IF_ERROR(check_limit(manifest.lights_size(), "lights", limits.max_lights(), "max_lights"));
   RADBAKE_RETURN_IF_ERROR(

@@ -27,7 +27,8 @@ void set_limit(pid_t pid, __rlimit_resource resource, rlim_t value) {
 std::string describe_end(const siginfo_t& facts) {
   if (facts.si_code == CLD_EXITED) return "exited with code " + std::to_string(facts.si_status);
   const char* name = sigabbrev_np(facts.si_status);
-  return "was killed by " + (name ? std::string("SIG") + name : "signal " + std::to_string(facts.si_status));
+  const char* meaning = facts.si_status == SIGSYS ? " (a system call that its sandbox forbids)" : "";
+  return "was killed by " + (name ? std::string("SIG") + name : "signal " + std::to_string(facts.si_status)) + meaning;
 }
 
 /// What posix_spawn needs, freed at the end.

@@ -154,6 +154,9 @@ Result<void> BakeServer::listen(const access::ListenAddress& where) {
   builder.RegisterService(server_service_.get());
   builder.SetMaxReceiveMessageSize(static_cast<int>(options_.limits.max_message_bytes));
   builder.SetMaxSendMessageSize(kMaxSendBytes);
+  // gRPC takes memory for all that a compressed message becomes before it looks at the limit on its size.
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.SetResourceQuota(grpc::ResourceQuota("radbaked").Resize(kTransportQuotaBytes));
   // Reflection is the one service with a blocking implementation: two threads are enough for it.
   builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);

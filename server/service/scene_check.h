@@ -2,6 +2,9 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <string>
+#include <vector>
+
 #include "common/base/limits.h"
 #include "radbake/v1/content.pb.h"
 #include "radbake/v1/settings.pb.h"
@@ -16,6 +19,11 @@ struct SceneRequest {
   const v1::BakeSettings& settings;
   const v1::RunOptions& run;
 };
+
+/// Checks the bytes of a manifest: readable, its counts within the limits, digests well formed. Counts records before
+/// it takes memory for them. `inputs`: every blob that it names once, itself (its own digest) first.
+grpc::Status check_manifest(const std::string& bytes, const Digest& digest, const Limits& limits,
+                            std::vector<Digest>& inputs);
 
 /// Checks a request before anything is queued: settings in range, the manifest (the only bytes of a client that this
 /// process parses) readable, its counts within the limits, every blob that it names present. Fills `work`.

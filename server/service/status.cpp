@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "common/base/shortened.h"
 #include "common/base/version.h"
 #include "google/rpc/error_details.pb.h"
 
@@ -118,7 +119,7 @@ google::rpc::Status to_message(const Error& error) {
 Error from_message(const google::rpc::Status& status) {
   const auto* found =
       std::find_if(kCodes.begin(), kCodes.end(), [&](const auto& pair) { return pair.second == status.code(); });
-  return {found == kCodes.end() ? ErrorCode::kInternal : found->first, status.message()};
+  return {found == kCodes.end() ? ErrorCode::kInternal : found->first, shortened(status.message())};
 }
 
 }  // namespace radbake::service

@@ -1,15 +1,19 @@
 #include <grpc/grpc.h>
 #include <grpcpp/create_channel_posix.h>
+#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <string>
 #include <utility>
 
+#include "common/base/digest.h"
 #include "common/base/version.h"
 #include "common/log/log.h"
 #include "server/handover/handover.h"
+#include "server/worker/memory_limit.h"
 #include "server/worker/run_worker.h"
+#include "server/worker/sandbox.h"
 
 using namespace radbake;  // NOLINT(google-build-using-namespace)
 
@@ -41,8 +45,13 @@ int main(int argc, char** argv) {
     return worker::kExitUsage;
   }
 
-  // What takes time and is the same for all jobs.
+  // What takes time and is the same for all jobs, and what reads files.
   grpc_init();
+  worker::seconds_since_process_start();
+  digest_of("");
+  worker::name_lack_of_memory_at_the_end();
+  // Before there is anything of a client's.
+  if (const auto isolated = worker::enter_sandbox(); !isolated.ok()) spdlog::warn("{}", isolated.error().message);
   double waited_seconds = 0;
   if (waits) {
     if (!handover::announce(fd).ok()) return worker::kExitServerGone;

@@ -14,20 +14,31 @@
 
 namespace radbake::worker {
 
-double seconds_since_process_start() {
+namespace {
+
+/// When this process started, seconds since boot; negative if the system does not say.
+double read_process_start() {
   // The 22nd field is the start in ticks since boot. The second is the program's name and may hold anything: count
   // from its closing bracket.
   std::ifstream file("/proc/self/stat");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const auto bracket = text.rfind(')');
-  if (bracket == std::string::npos) return 0;
+  if (bracket == std::string::npos) return -1;
   std::istringstream fields(text.substr(bracket + 1));
   std::string field;
   for (int i = 3; i <= 22; ++i) fields >> field;
+  if (!fields) return -1;
+  return std::stod(field) / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
+}  // namespace
+
+double seconds_since_process_start() {
+  // Read once: a worker in its sandbox finds no files.
+  static const double kStartedAt = read_process_start();
   timespec now{};
-  if (!fields || ::clock_gettime(CLOCK_BOOTTIME, &now) != 0) return 0;
-  const double started_at = std::stod(field) / static_cast<double>(::sysconf(_SC_CLK_TCK));
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec) - started_at;
+  if (kStartedAt < 0 || ::clock_gettime(CLOCK_BOOTTIME, &now) != 0) return 0;
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec) - kStartedAt;
 }
 
 void StageClock::begin(const std::string& stage) {

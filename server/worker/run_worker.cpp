@@ -7,18 +7,19 @@
 #include <chrono>
 #include <exception>
 #include <functional>
-#include <new>
 #include <span>
 #include <thread>
 #include <utility>
 
 #include "common/base/digest.h"
 #include "common/base/limits.h"
+#include "common/base/shortened.h"
 #include "common/base/version.h"
 #include "common/codec/scene_codec.h"
 #include "common/log/log.h"
 #include "server/settings/to_options.h"
 #include "server/worker/input_blobs.h"
+#include "server/worker/memory_limit.h"
 #include "server/worker/report_stream.h"
 #include "server/worker/result_messages.h"
 #include "server/worker/send_blob.h"
@@ -187,9 +188,8 @@ Result<v1::WorkerReport> work(const v1::StartWork& start, const WorkerIdentity& 
   try {
     const InputBlobs inputs(start, identity.inputs);
     return start.plan_only() ? plan(start, inputs, stream) : bake(start, identity, inputs, stream);
-  } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kResourceExhausted, "the bake needs more memory than its worker may use"};
   } catch (const std::exception& exception) {
+    if (is_lack_of_memory(exception)) return out_of_memory();
     return internal_error(std::string("the worker failed: ") + exception.what());
   }
 }
@@ -220,7 +220,7 @@ int run_worker(const std::shared_ptr<grpc::Channel>& channel, const WorkerIdenti
   } else if (done.error().code == ErrorCode::kCancelled) {
     *outcome.mutable_cancelled() = to_message(done.error());
   } else {
-    spdlog::warn("{} attempt {} failed: {}", identity.job, identity.attempt, done.error().message);
+    spdlog::warn("{} attempt {} failed: {}", identity.job, identity.attempt, shortened(done.error().message));
     *outcome.mutable_failed() = to_message(done.error());
   }
   if (!stream.finish(std::move(outcome))) {

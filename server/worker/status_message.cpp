@@ -2,6 +2,8 @@
 
 #include <grpcpp/support/status_code_enum.h>
 
+#include "common/base/shortened.h"
+
 namespace radbake::worker {
 namespace {
 
@@ -25,7 +27,7 @@ grpc::StatusCode to_code(ErrorCode code) {
 google::rpc::Status to_message(const Error& error) {
   google::rpc::Status status;
   status.set_code(to_code(error.code));
-  status.set_message(error.message);
+  status.set_message(shortened(error.message));
   return status;
 }
 

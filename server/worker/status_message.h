@@ -5,7 +5,7 @@
 
 namespace radbake::worker {
 
-/// An error as it goes to the server: gRPC's code of the same name, and the message.
+/// An error as it goes to the server: gRPC's code of the same name, and the message, shortened.
 google::rpc::Status to_message(const Error& error);
 
 }  // namespace radbake::worker

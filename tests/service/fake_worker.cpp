@@ -8,10 +8,12 @@
 #include <grpcpp/create_channel_posix.h>
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -24,6 +26,7 @@
 #include "common/base/version.h"
 #include "radbake/v1/worker.grpc.pb.h"
 #include "server/handover/handover.h"
+#include "server/worker/sandbox.h"
 
 namespace radbake::testing {
 namespace {
@@ -67,6 +70,7 @@ class FakeWorker {
   }
 
   void do_work(FakeWork work) {
+    if (work >= kStartProcess && !worker::enter_sandbox().ok()) _exit(5);
     report_progress(v1::PREPARING, 0.1);
     switch (work) {
       case kSucceed: return succeed();
@@ -82,6 +86,13 @@ class FakeWorker {
       case kListDescriptors: return fail(grpc::INVALID_ARGUMENT, list_descriptors());
       case kSucceedSecondTime: return attempt_ == 1 ? run(true) : succeed();
       case kReadInputs: return fail(grpc::INVALID_ARGUMENT, read_inputs());
+      // What breaks out does not get to its outcome.
+      case kStartProcess: fork(); return succeed();
+      case kRunProgram: execl("/bin/true", "true", nullptr); return succeed();
+      case kOpenSocket: socket(AF_INET, SOCK_STREAM, 0); return succeed();
+      case kWriteFile: open("/tmp/radbake-fake-worker", O_WRONLY | O_CREAT, 0600); return succeed();
+      case kReadFile:
+        return fail(grpc::INVALID_ARGUMENT, open("/etc/passwd", O_RDONLY) < 0 ? std::strerror(errno) : "opened");
     }
     fail(grpc::INTERNAL, "unknown fake work " + std::to_string(work));
   }

@@ -17,6 +17,12 @@ enum FakeWork {
   kSucceedSecondTime = 11,  ///< attempt 1 as kRunUntilCancelled, attempt 2 as kSucceed
   kReadInputs = 12,         ///< fails with the sum of the sizes of its inputs, read from their descriptors
   kNearlyDone = 40,         ///< as kRunUntilCancelled, but says all the time that it is nearly done
+  // In the sandbox of real workers:
+  kStartProcess = 30,  ///< forks
+  kRunProgram = 31,    ///< executes /bin/true in its place
+  kOpenSocket = 32,    ///< a network socket
+  kWriteFile = 33,     ///< opens a file in the temporary folder for writing
+  kReadFile = 34,      ///< fails with what open() of /etc/passwd says
 };
 
 // What a worker does before it has its work goes by its program's name.

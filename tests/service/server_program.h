@@ -23,6 +23,7 @@ class ServerProgram {
   int wait();
   int end(int signal);
   void send(int signal) const;
+  pid_t pid() const { return pid_; }
 
   /// Everything that was read, of stdout and stderr.
   const std::string& output() const { return output_text_; }

@@ -128,14 +128,12 @@ TEST_F(TenantsTest, CannotTellWhichBlobsAnotherHas) {
 TEST_F(TenantsTest, CannotTellHowFarAnothersUploadIs) {
   const std::string bytes(5000, 'u');
   const auto context = new_context();
-  v1::UploadResult result;
-  const auto stream = acme_->content->Upload(context.get(), &result);
+  const auto stream = acme_->content->Upload(context.get());
   v1::UploadChunk chunk;
   *chunk.mutable_digest() = digest_message(bytes);
   chunk.set_data(bytes.substr(0, 2000));
   stream->Write(chunk);
-  stream->WritesDone();
-  EXPECT_EQ(stream->Finish().error_code(), grpc::INVALID_ARGUMENT);
+  EXPECT_EQ(finish_upload(*stream).error_code(), grpc::INVALID_ARGUMENT);
   v1::QueryUploadRequest query;
   *query.mutable_digest() = digest_message(bytes);
   v1::QueryUploadResponse answer;

@@ -2,6 +2,8 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <memory>
+#include <new>
 #include <utility>
 
 #include "common/base/check.h"
@@ -44,10 +46,10 @@ void set_lane(Packet& packet, int k, const Ray& ray) {
 class Tree {
  public:
   Tree(std::span<const Corners> triangles, const std::stop_token& stop, const Opacity* opacity) : opacity_(opacity) {
-    device_ = rtcNewDevice(nullptr);
-    RADBAKE_CHECK(device_ != nullptr);
-    scene_ = rtcNewScene(device_);
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+    device_.reset(rtcNewDevice(nullptr));
+    check_memory(rtcGetDeviceError(device_.get()));
+    scene_.reset(rtcNewScene(device_.get()));
+    rtcSetSceneFlags(scene(), RTC_SCENE_FLAG_ROBUST);
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       ids_[opacity != nullptr && opacity->is_see_through(t)].push_back(t);
     }
@@ -60,25 +62,22 @@ class Tree {
     const auto goes_on = [](void* token, double) {
       return !static_cast<const std::stop_token*>(token)->stop_requested();
     };
-    rtcSetSceneProgressMonitorFunction(scene_, goes_on, const_cast<std::stop_token*>(&stop));
-    one_thread.execute([this] { rtcCommitScene(scene_); });
-    rtcSetSceneProgressMonitorFunction(scene_, nullptr, nullptr);
-    const RTCError error = rtcGetDeviceError(device_);
+    rtcSetSceneProgressMonitorFunction(scene(), goes_on, const_cast<std::stop_token*>(&stop));
+    one_thread.execute([this] { rtcCommitScene(scene()); });
+    rtcSetSceneProgressMonitorFunction(scene(), nullptr, nullptr);
+    const RTCError error = rtcGetDeviceError(device());
+    check_memory(error);
     is_built_ = error != RTC_ERROR_CANCELLED;
     RADBAKE_CHECK(!is_built_ || error == RTC_ERROR_NONE);
   }
 
-  ~Tree() {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-  }
   Tree(const Tree&) = delete;
   Tree& operator=(const Tree&) = delete;
 
   bool is_built() const { return is_built_; }
   bool is_see_through() const { return !ids_[kSeeThrough].empty(); }
-  RTCScene scene() const { return scene_; }
-  RTCDevice device() const { return device_; }
+  RTCScene scene() const { return scene_.get(); }
+  RTCDevice device() const { return device_.get(); }
   const Opacity* opacity() const { return opacity_; }
   std::uint32_t triangle(unsigned geometry, unsigned primitive) const { return ids_[geometry][primitive]; }
   /// Nine numbers.
@@ -89,13 +88,21 @@ class Tree {
  private:
   static constexpr int kSeeThrough = 1;
 
+  /// Embree reports by a code what everything else throws.
+  static void check_memory(RTCError error) {
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+  }
+
   void attach(std::span<const Corners> triangles, int kind) {
     const std::vector<std::uint32_t>& ids = ids_[kind];
-    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    const std::unique_ptr<RTCGeometryTy, decltype(&rtcReleaseGeometry)> owner(
+        rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE), &rtcReleaseGeometry);
+    RTCGeometry geometry = owner.get();
     auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                  3 * sizeof(float), 3 * ids.size()));
     auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                                                    3 * sizeof(unsigned), ids.size()));
+    if (vertices == nullptr || indices == nullptr) throw std::bad_alloc();
     for (std::size_t t = 0; t < ids.size(); ++t) {
       for (int corner = 0; corner < 3; ++corner) {
         const std::size_t at = 3 * t + corner;
@@ -110,8 +117,7 @@ class Tree {
       rtcSetGeometryOccludedFilterFunction(geometry, weaken);
     }
     rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene_, geometry, static_cast<unsigned>(kind));
-    rtcReleaseGeometry(geometry);
+    rtcAttachGeometryByID(scene(), geometry, static_cast<unsigned>(kind));
   }
 
   static void pass_or_stop(const RTCFilterFunctionNArguments* args);
@@ -120,8 +126,8 @@ class Tree {
   const Opacity* opacity_;
   std::array<std::vector<std::uint32_t>, 2> ids_;  ///< triangle of each primitive, by geometry
   std::array<const float*, 2> vertices_{};         ///< [9 x primitives], of the geometries
-  RTCDevice device_ = nullptr;
-  RTCScene scene_ = nullptr;
+  std::unique_ptr<RTCDeviceTy, decltype(&rtcReleaseDevice)> device_{nullptr, &rtcReleaseDevice};
+  std::unique_ptr<RTCSceneTy, decltype(&rtcReleaseScene)> scene_{nullptr, &rtcReleaseScene};
   bool is_built_ = false;
 };
 

@@ -113,7 +113,7 @@ using Corners = std::array<Vec3, 3>;
 
 /// Embree's tree over triangles, watertight at shared edges. Corners should lie within a few units of 0: they are
 /// stored in float. Null where `stop` was requested while the tree was built. `opacity` outlives it; null: all is
-/// opaque.
+/// opaque. Throws std::bad_alloc where memory does not suffice, as vectors do.
 std::unique_ptr<Visibility> make_embree_visibility(std::span<const Corners> triangles, std::stop_token stop = {},
                                                    const Opacity* opacity = nullptr);
 

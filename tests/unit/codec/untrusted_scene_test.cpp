@@ -1,3 +1,5 @@
+#include <draco/compression/decode.h>
+#include <draco/compression/encode.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/stubs/logging.h>
 #include <gtest/gtest.h>
@@ -12,6 +14,7 @@
 #include "common/codec/draco_peek.h"
 #include "common/codec/mesh_codec.h"
 #include "common/codec/scene_codec.h"
+#include "tests/fuzz/attacks.h"
 #include "tests/unit/codec/codec_scenes.h"
 
 namespace radbake {
@@ -51,31 +54,13 @@ Result<Scene> decode_blob(const std::string& bytes, v1::MeshRecord record) {
   return decode_encoded(encoded);
 }
 
-void append_varint(std::string& bytes, std::uint32_t value) {
-  for (; value >= 0x80; value >>= 7) bytes.push_back(static_cast<char>(value | 0x80));
-  bytes.push_back(static_cast<char>(value));
-}
-
-/// 42 bytes of edgebreaker that claim so many faces.
-std::string bomb(std::uint32_t num_faces) {
-  std::string bytes = "DRACO";
-  for (const char c : {2, 2, 1, 1, 0, 0, 0}) bytes.push_back(c);
-  append_varint(bytes, num_faces / 2);  // vertices
-  append_varint(bytes, num_faces);
-  bytes.push_back(0);
-  append_varint(bytes, num_faces);  // symbols
-  append_varint(bytes, 0);          // splits
-  bytes.resize(42, '\0');
-  return bytes;
-}
-
 TEST(UntrustedScene, RefusesABombBeforeItTakesMemory) {
   v1::MeshRecord record;
   record.set_num_vertices(4);
   record.set_num_triangles(2);
   rusage before{};
   getrusage(RUSAGE_SELF, &before);
-  EXPECT_EQ(message_of(decode_blob(bomb(50'000'000), record)),
+  EXPECT_EQ(message_of(decode_blob(attacks::draco_bomb(50'000'000), record)),
             "mesh 'node/wall#0' has 50000000 triangles, its record says 2");
   rusage after{};
   getrusage(RUSAGE_SELF, &after);
@@ -88,7 +73,8 @@ TEST(UntrustedScene, RefusesABombThatItsRecordVouchesFor) {
   v1::MeshRecord record;
   record.set_num_vertices(4);
   record.set_num_triangles(100'000);
-  EXPECT_THAT(message_of(decode_blob(bomb(100'000), record)), HasSubstr("mesh 'node/wall#0' does not decode"));
+  EXPECT_THAT(message_of(decode_blob(attacks::draco_bomb(100'000), record)),
+              HasSubstr("mesh 'node/wall#0' does not decode"));
 }
 
 TEST(UntrustedScene, SaysWhatIsWrongWithADracoHead) {
@@ -146,6 +132,48 @@ TEST(UntrustedScene, RefusesAttributesOfTheWrongKind) {
   manifest.mutable_meshes(0)->set_has_normals(true);
   encoded.blobs.back().bytes = manifest.SerializeAsString();
   EXPECT_THAT(message_of(decode_encoded(encoded)), HasSubstr("mesh 'sheet#0' has no attribute normal"));
+}
+
+TEST(UntrustedScene, HoldsAttributesAgainstTheRecordBeforeItDecodesThem) {
+  // Their heads are there, of their values the last are not: Draco alone would say that it does not decode.
+  EncodedScene encoded = *encode_scene(sheet_scene(), {});
+  v1::SceneManifest manifest = manifest_of(encoded);
+  std::string& blob = encoded.blobs[0].bytes;
+  blob.resize(blob.size() * 3 / 4);
+  encoded.blobs[0].digest.size_bytes = blob.size();
+  manifest.mutable_meshes(0)->mutable_blob()->set_size_bytes(blob.size());
+  encoded.blobs.back().bytes = manifest.SerializeAsString();
+  EXPECT_THAT(message_of(decode_encoded(encoded)), HasSubstr("mesh 'sheet#0' does not decode"));
+
+  manifest.mutable_meshes(0)->set_has_normals(false);
+  encoded.blobs.back().bytes = manifest.SerializeAsString();
+  EXPECT_THAT(message_of(decode_encoded(encoded)), HasSubstr("mesh 'sheet#0' has 5 attributes, its record says 4"));
+}
+
+TEST(UntrustedScene, RefusesTextureCoordinatesThatArePredictedByPositions) {
+  // The same mesh encoded anew, as a stranger may: Draco takes its word for the length of such a prediction.
+  EncodedScene encoded = *encode_scene(sheet_scene(), {});
+  const auto encode_again = [&](int speed) {
+    draco::DecoderBuffer sheet;
+    sheet.Init(encoded.blobs[0].bytes.data(), encoded.blobs[0].bytes.size());
+    const auto mesh = std::move(draco::Decoder().DecodeMeshFromBuffer(&sheet)).value();
+    draco::Encoder encoder;
+    encoder.SetSpeedOptions(speed, speed);
+    for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::TEX_COORD}) {
+      encoder.SetAttributeQuantization(type, 12);
+    }
+    draco::EncoderBuffer buffer;
+    EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+    EncodedScene changed = encoded;
+    changed.blobs[0].bytes.assign(buffer.data(), buffer.size());
+    changed.blobs[0].digest.size_bytes = buffer.size();
+    v1::SceneManifest manifest = manifest_of(encoded);
+    manifest.mutable_meshes(0)->mutable_blob()->set_size_bytes(buffer.size());
+    changed.blobs.back().bytes = manifest.SerializeAsString();
+    return message_of(decode_encoded(changed));
+  };
+  EXPECT_EQ(encode_again(5), "decoded");
+  EXPECT_THAT(encode_again(0), HasSubstr("mesh 'sheet#0' does not decode"));
 }
 
 TEST(UntrustedScene, RefusesATextureCoordinateThatIsNotThere) {

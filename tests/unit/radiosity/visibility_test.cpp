@@ -1,10 +1,15 @@
 #include "server/radiosity/visibility/visibility.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
+#include <new>
 #include <random>
 
 namespace radbake::radiosity {
@@ -43,6 +48,39 @@ TEST(Visibility, OfEmbreeIsBuiltOnOneThread) {
   const std::ptrdiff_t before = num_threads();
   const auto embree = make_embree_visibility(triangles);
   EXPECT_EQ(num_threads(), before);
+}
+
+TEST(Visibility, OfEmbreeThrowsWhereMemoryEnds) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose shadow takes terabytes of addresses
+  const auto triangles = random_triangles(200000, 9);
+  constexpr rlim_t kMebibyte = 1 << 20;
+  // From what the first vertices do not fit into, to what the tree does.
+  bool is_built = false;
+  for (rlim_t mebibytes = 1; mebibytes <= 1024; mebibytes *= 2) {
+    const pid_t child = fork();
+    if (child == 0) {
+      rlim_t pages = 0;
+      std::ifstream("/proc/self/statm") >> pages;
+      const rlim_t most = pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + mebibytes * kMebibyte;
+      const rlimit limit{most, most};
+      setrlimit(RLIMIT_AS, &limit);
+      try {
+        make_embree_visibility(triangles);
+        _exit(0);
+      } catch (const std::bad_alloc&) {
+        _exit(1);
+      }
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status)) << mebibytes << " MiB: signal " << WTERMSIG(status);
+    if (mebibytes == 1) {
+      EXPECT_EQ(WEXITSTATUS(status), 1);
+    }
+    is_built = WEXITSTATUS(status) == 0;
+  }
+  EXPECT_TRUE(is_built);
+#endif
 }
 
 // Single and double precision may disagree on rays that graze an edge: about 1 in 1e5 here.

@@ -6,6 +6,9 @@
 #include <utility>
 
 #include "client/api/connection.h"
+#include "client/api/diagnosis.h"
+#include "client/api/security.h"
+#include "common/base/check.h"
 #include "common/base/trace.h"
 #include "common/base/version.h"
 
@@ -43,6 +46,8 @@ void keep_grpc_up() {
 Call::Call(const Connection& connection, std::stop_token stop) : on_stop_(std::move(stop), Cancel{&context_}) {
   context_.AddMetadata("radbake-protocol", std::to_string(kProtocolMajor));
   if (!connection.options.traceparent.empty()) context_.AddMetadata("traceparent", connection.options.traceparent);
+  const std::string& token = connection.options.security.token;
+  if (!token.empty()) context_.AddMetadata("authorization", "Bearer " + token);
 }
 
 Error Connection::describe(const grpc::Status& status) const {
@@ -79,20 +84,28 @@ Result<Client> Client::connect(const std::string& address, const ClientOptions& 
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   arguments.SetUserAgentPrefix(std::string("radbake/") + kEngineVersion);
 
+  RADBAKE_ASSIGN_OR_RETURN(const auto credentials, make_credentials(address, options.security));
   auto connection = std::make_unique<Connection>();
   connection->address = address;
   connection->options = options;
-  connection->channel = grpc::CreateCustomChannel(target_of(address), grpc::InsecureChannelCredentials(), arguments);
+  connection->channel = grpc::CreateCustomChannel(target_of(address), credentials, arguments);
   connection->server = v1::Server::NewStub(connection->channel);
   connection->content = v1::Content::NewStub(connection->channel);
   connection->bakes = v1::Bakes::NewStub(connection->channel);
 
-  RADBAKE_ASSIGN_OR_RETURN(
-      connection->capabilities,
-      call_with_retries<v1::Capabilities>(
-          *connection, options.call_deadline, stop, [&](grpc::ClientContext* context, v1::Capabilities* response) {
-            return connection->server->GetCapabilities(context, v1::GetCapabilitiesRequest(), response);
-          }));
+  auto answer = call_with_retries<v1::Capabilities>(
+      *connection, options.call_deadline, stop, [&](grpc::ClientContext* context, v1::Capabilities* response) {
+        return connection->server->GetCapabilities(context, v1::GetCapabilitiesRequest(), response);
+      });
+  if (!answer.ok()) {
+    // gRPC does not say why a handshake failed.
+    Error error = answer.error();
+    if (error.code != ErrorCode::kUnavailable) return error;
+    const std::string reason = diagnose_tls(target_of(address), options.security);
+    if (!reason.empty()) error.message = "server " + address + " cannot be reached: " + reason;
+    return error;
+  }
+  connection->capabilities = std::move(answer).value();
   const v1::Capabilities& capabilities = connection->capabilities;
   if (capabilities.protocol_major() != kProtocolMajor) {
     return Error{ErrorCode::kFailedPrecondition,

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -17,6 +18,13 @@
 
 namespace radbake::api {
 
+/// Whom a client trusts, and how it proves who it is. Empty: not given.
+struct ClientSecurity {
+  std::filesystem::path ca;                ///< speak TLS, with a server whose certificate these authorities signed
+  std::filesystem::path certificate, key;  ///< the client's own, for a server that asks for them
+  std::string token;                       ///< a bearer token: over TLS, or to this machine
+};
+
 /// How long a client keeps trying while a server is away, and how long it waits for an answer.
 struct ClientOptions {
   std::chrono::milliseconds first_delay{100};  ///< doubles from try to try
@@ -26,6 +34,7 @@ struct ClientOptions {
   std::chrono::milliseconds call_deadline{30000};
   std::chrono::milliseconds plan_deadline{60000};
   std::string traceparent;  ///< W3C, sent with every call; empty: the server makes one for each
+  ClientSecurity security;
 };
 
 /// A blob that the caller keeps in memory.
@@ -53,7 +62,8 @@ class Client {
   /// Connects and checks that both speak one major version of the protocol.
   ///
   /// `address`: HOST:PORT, HOST (port 7419) or unix:PATH.
-  /// Errors: kUnavailable when nobody answers; kFailedPrecondition for another protocol version.
+  /// Errors: kUnavailable when nobody answers; kFailedPrecondition for another protocol version, or where the server
+  /// does not accept who calls; kInvalidArgument for security options that do not go together.
   static Result<Client> connect(const std::string& address, const ClientOptions& options = {},
                                 std::stop_token stop = {});
   ~Client();

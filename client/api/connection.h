@@ -62,7 +62,7 @@ class Backoff {
   std::condition_variable_any wakeup_;
 };
 
-/// A context for one call: says the protocol's version and the trace, and is cancelled by the stop token.
+/// A context for one call: says the protocol's version, the trace and the token, and is cancelled by the stop token.
 class Call {
  public:
   Call(const Connection& connection, std::stop_token stop);

@@ -68,10 +68,11 @@ class Upload {
 
   grpc::Status send(const std::function<void(std::uint64_t)>& on_sent) {
     Call call(connection_, stop_);
+    const auto stream = connection_.content->Upload(&call.context());
     v1::UploadResult result;
-    const auto writer = connection_.content->Upload(&call.context(), &result);
     v1::UploadChunk chunk;
     fill(blob_.digest, chunk.mutable_digest());
+    chunk.set_wants_progress(true);
     std::uint64_t offset = offset_;
     bool is_last = false;
     // An empty blob is one empty chunk.
@@ -81,14 +82,17 @@ class Upload {
       chunk.set_offset(offset);
       chunk.set_data(blob_.bytes.data() + offset, size);
       chunk.set_finish(is_last);
-      // A write that fails means that the server has ended the stream: Finish says why.
-      if (!writer->Write(chunk)) break;
-      chunk.clear_digest();
+      // A write or an answer that fails means that the server has ended the stream: Finish says why.
+      if (!stream->Write(chunk)) break;
       offset += size;
       on_sent(offset);
+      // What is on its way when the connection breaks has to be sent again: never more than this chunk.
+      if (!stream->Read(&result) || result.already_present()) break;
+      chunk.Clear();
     }
-    writer->WritesDone();
-    const grpc::Status status = writer->Finish();
+    stream->WritesDone();
+    while (stream->Read(&result)) continue;
+    const grpc::Status status = stream->Finish();
     if (status.ok() && !result.already_present() && result.committed_bytes() != blob_.bytes.size()) {
       return {grpc::StatusCode::INTERNAL, "the server stored " + std::to_string(result.committed_bytes()) + " of the " +
                                               std::to_string(blob_.bytes.size()) + " bytes of blob " +

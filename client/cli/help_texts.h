@@ -5,6 +5,14 @@ namespace radbake::cli {
 // What stands below the options in each command's help.
 
 inline constexpr char kServerHelp[] = "HOST:PORT or unix:PATH of a radbaked (environment: RADBAKE_SERVER)";
+inline constexpr char kCaHelp[] =
+    "Speak TLS: PEM file of the authorities that signed the server's certificate (environment: RADBAKE_TLS_CA)";
+inline constexpr char kCertificateHelp[] =
+    "This client's certificate, for a server that asks for one (environment: RADBAKE_TLS_CERT)";
+inline constexpr char kKeyHelp[] = "Its private key (environment: RADBAKE_TLS_KEY)";
+inline constexpr char kTokenHelp[] =
+    "File whose first line is this client's token, for a server that asks for one (environment: RADBAKE_TOKEN, the "
+    "token itself)";
 inline constexpr char kExitCodes[] =
     "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, 5 bake failed, 6 cancelled, 7 error asked for "
     "not reached (--strict), 130 left by Ctrl-C.\n";
@@ -15,7 +23,8 @@ inline constexpr char kMainFooter[] =
     "  radbake submit room.glb -o baked/ --server bakery:7419\n"
     "  radbake plan room.glb                             what would be simulated, why, and what it takes\n"
     "  radbake submit --help                             what can be chosen, with more examples\n"
-    "  export RADBAKE_SERVER=bakery:7419; radbake list   what the server bakes and has baked\n\n";
+    "  export RADBAKE_SERVER=bakery:7419; radbake list   what the server bakes and has baked\n"
+    "  radbake list --server bakery:7419 --tls-ca ca.pem --token-file ~/.radbake-token\n\n";
 
 inline constexpr char kSubmitFooter[] =
     "\nWrites to DIR, when all is done:\n"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 
 #include "client/cli/commands.h"
 
@@ -29,6 +30,8 @@ ExitCode run(const CommandContext& context) {
 int main(int argc, char** argv) {
   // A reader of our stdout that goes away must not keep us from cleaning up.
   signal(SIGPIPE, SIG_IGN);
+  // gRPC logs what its calls return as errors, which we report: once is enough.
+  setenv("GRPC_VERBOSITY", "NONE", 0);
   const std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
   const auto parsed = parse_command_line(arguments);
   if (const auto* exit = std::get_if<EarlyExit>(&parsed)) {

@@ -9,6 +9,7 @@
 
 #include "client/cli/exit_code.h"
 #include "client/cli/help_texts.h"
+#include "client/cli/security_options.h"
 #include "client/options/effect_options.h"
 #include "client/options/target_options.h"
 #include "client/options/words.h"
@@ -82,6 +83,12 @@ class Parser {
     if (line_.strict && options::asked_error(line_.bake) == 0) {
       return EarlyExit{kUsage, "", "--strict needs an error to reach: --max-error or --quality\n"};
     }
+    // A private server asks nobody who he is.
+    if (!line_.server.empty()) {
+      Result<api::ClientSecurity> security = read_security(security_);
+      if (!security.ok()) return EarlyExit{kUsage, "", security.error().message + "\n"};
+      line_.security = std::move(security).value();
+    }
     // Both the name that submit prints and the bare id name a job.
     if (!line_.job.empty() && line_.job.rfind("bakes/", 0) != 0) line_.job = "bakes/" + line_.job;
     return line_;
@@ -93,6 +100,7 @@ class Parser {
     CLI::App* sub = app_.add_subcommand(name, description);
     sub->footer(footer + kExitCodes);
     sub->add_option("--server", line_.server, kServerHelp)->type_name("ADDRESS");
+    add_security_options(*sub, security_);
     sub->add_flag("--json", line_.json,
                   command == Command::kSubmit || command == Command::kWatch ? "Print one JSON event a line on stdout"
                                                                             : "Print one JSON object on stdout");
@@ -202,6 +210,7 @@ class Parser {
   }
 
   CommandLine line_;
+  SecurityChoices security_;
   CLI::App app_{"Bakes global illumination into lightmaps: diffuse light, by radiosity"};
 };
 

@@ -5,6 +5,7 @@
 #include <variant>
 #include <vector>
 
+#include "client/api/client.h"
 #include "client/options/bake_options.h"
 
 namespace radbake::cli {
@@ -35,7 +36,8 @@ struct CompareChoices {
 /// A valid command line.
 struct CommandLine {
   Command command = Command::kCapabilities;
-  std::string server;  ///< empty: a private one
+  std::string server;            ///< empty: a private one
+  api::ClientSecurity security;  ///< of the server that is named
   bool json = false;
   std::filesystem::path scene;   ///< submit, plan; download: empty where it is not given
   BakeChoices bake;              ///< submit, plan

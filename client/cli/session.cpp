@@ -11,6 +11,7 @@ namespace {
 api::ClientOptions client_options(const CommandLine& line, const TraceContext& trace) {
   api::ClientOptions options;
   options.traceparent = to_traceparent(trace);
+  options.security = line.security;
   options.plan_deadline = std::chrono::milliseconds(std::llround(1000 * line.plan_seconds));
   return options;
 }

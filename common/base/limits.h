@@ -26,6 +26,14 @@ struct Limits {
   std::uint64_t max_content_bytes = 0;               ///< of a tenant's blobs, uploads included; 0: as the disk has
   std::uint64_t max_running_plans = 4;               ///< plans do not wait
   std::uint64_t min_free_disk_bytes = 256ULL << 20;  ///< below it nothing new is taken
+  std::uint64_t max_connections = 256;               ///< one above is closed at once
+  std::uint64_t max_calls_per_connection = 200;
+  std::uint64_t max_uploads = 64;  ///< at the same time; each holds one message of memory
+  std::uint64_t max_uploads_per_tenant = 32;
+  std::uint64_t max_downloads = 64;  ///< at the same time; each holds one chunk of memory
+  std::uint64_t max_downloads_per_tenant = 32;
+  std::uint64_t max_watches = 1000;  ///< at the same time
+  std::uint64_t max_watches_per_tenant = 500;
 };
 
 /// Copies limits into a message with the same fields: limits_message<v1::Limits>(limits). A template, so that this
@@ -53,6 +61,14 @@ Message limits_message(const Limits& limits) {
   message.set_max_content_bytes(limits.max_content_bytes);
   message.set_max_running_plans(limits.max_running_plans);
   message.set_min_free_disk_bytes(limits.min_free_disk_bytes);
+  message.set_max_connections(limits.max_connections);
+  message.set_max_calls_per_connection(limits.max_calls_per_connection);
+  message.set_max_uploads(limits.max_uploads);
+  message.set_max_uploads_per_tenant(limits.max_uploads_per_tenant);
+  message.set_max_downloads(limits.max_downloads);
+  message.set_max_downloads_per_tenant(limits.max_downloads_per_tenant);
+  message.set_max_watches(limits.max_watches);
+  message.set_max_watches_per_tenant(limits.max_watches_per_tenant);
   return message;
 }
 

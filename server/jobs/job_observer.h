@@ -21,7 +21,7 @@ class JobObserver {
   /// A job leaves a state after so many seconds in it; it is recorded already.
   virtual void state_changed(store::JobState from, store::JobState to, double seconds_in_from) = 0;
   virtual void attempt_ended(AttemptEnd end) = 0;
-  /// A job was accepted; it was, or was not, answered by a bake with the same key that ended well or runs.
+  /// A submit that was, or was not, answered by a bake that has ended or runs.
   virtual void cache_looked_up(bool is_hit) = 0;
 };
 

@@ -120,12 +120,13 @@ Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) 
   if (owner.is_shared) {
     RADBAKE_ASSIGN_OR_RETURN(const std::optional<JobRecord> stored, find_result(owner, new_job.bake_key));
     if (stored) {
-      if (options_.observer != nullptr) options_.observer->cache_looked_up(true);
       RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job, &*stored));
+      if (options_.observer != nullptr) options_.observer->cache_looked_up(true);
       spdlog::info("{} answered from the store: '{}', the result of {}", record.name, record.label, stored->name);
       return find(record.name);
     }
     leader = find_leader(owner, new_job.bake_key);
+    if (options_.observer != nullptr) options_.observer->cache_looked_up(leader != nullptr);
   }
   if (const std::size_t num_waiting = waiting_.size() + leaders_.size(); num_waiting >= options_.max_queued) {
     return Error{
@@ -133,7 +134,6 @@ Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) 
         std::to_string(num_waiting) + " bakes are waiting, max_queued_bakes is " + std::to_string(options_.max_queued)};
   }
   RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job));
-  if (options_.observer != nullptr) options_.observer->cache_looked_up(leader != nullptr);
   RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
   const auto job = std::make_shared<Job>(record, std::move(events));
   {

@@ -44,18 +44,18 @@ struct QueueOptions {
   JobObserver* observer = nullptr;                ///< may be null; outlives the queue
 };
 
-/// How much there is to do.
-struct QueueStats {
-  std::uint64_t num_waiting = 0;
-  std::uint64_t num_running = 0;
-  std::uint64_t num_plans = 0;  ///< that are being made
-};
-
 /// Where a job that waits stands.
 struct QueuePlace {
   std::uint32_t position = 0;               ///< 1: next; 0: it does not wait
   std::int64_t expected_start_unix_ms = 0;  ///< 0: not known
   std::string shares;                       ///< the job that runs for it; empty: none
+};
+
+/// How much there is to do.
+struct QueueStats {
+  std::uint64_t num_waiting = 0;
+  std::uint64_t num_running = 0;
+  std::uint64_t num_plans = 0;  ///< that are being made
 };
 
 /// Accepts jobs, runs them one after the other in workers, and keeps the record of what became of them.
@@ -105,8 +105,7 @@ class JobQueue {
   /// Runs a worker that only plans. `on_done` is called once, from any thread, with the bytes of the plan.
   /// Returns a name for cancel_plan(). Errors: kResourceExhausted, kUnavailable; then on_done is never called.
   using PlanDone = std::function<void(Result<std::string>)>;
-  Result<std::string> start_plan(const std::string& tenant, const store::Work& work, PlanDone on_done,
-                                 const std::string& trace_id = "");
+  Result<std::string> start_plan(const store::JobOwner& owner, const store::Work& work, PlanDone on_done);
   void cancel_plan(const std::string& name);
 
   /// Finds the run that a worker belongs to. Errors: kFailedPrecondition if there is none.
@@ -147,8 +146,7 @@ class JobQueue {
   Result<std::shared_ptr<TileSpool>> begin_attempt(const std::shared_ptr<Job>& job, const store::JobRecord& record);
   /// What every run tells at its end.
   RunEvents ends_of(const std::string& name);
-  Result<std::string> start_plan_run(const std::string& tenant, const store::Work& work, PlanDone on_done,
-                                     const std::string& trace_id);
+  Result<std::string> start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done);
   void advance(const std::string& name, store::JobState state);
   void end_work(const std::string& name, WorkOutcome outcome);
   void end_run(const std::string& name, const WorkerExit& exit);

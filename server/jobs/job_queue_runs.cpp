@@ -340,28 +340,26 @@ void JobQueue::end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run
   queue_again(job, reason + "; it goes on in another attempt", true);
 }
 
-Result<std::string> JobQueue::start_plan(const std::string& tenant, const store::Work& work, PlanDone on_done,
-                                         const std::string& trace_id) {
+Result<std::string> JobQueue::start_plan(const store::JobOwner& owner, const store::Work& work, PlanDone on_done) {
   RADBAKE_RETURN_IF_ERROR(check_recovered());
-  return thread_.run([&] { return start_plan_run(tenant, work, std::move(on_done), trace_id); });
+  return thread_.run([&] { return start_plan_run(owner, work, std::move(on_done)); });
 }
 
-Result<std::string> JobQueue::start_plan_run(const std::string& tenant, const store::Work& work, PlanDone on_done,
-                                             const std::string& trace_id) {
+Result<std::string> JobQueue::start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done) {
   if (is_refusing_ || is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
   if (plans_.size() >= options_.max_running_plans) {
     return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
                                                     " plans are being made, max_running_plans is " +
                                                     std::to_string(options_.max_running_plans)};
   }
-  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(tenant));
+  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(owner.tenant));
   const std::string name = "plans/" + std::to_string(next_plan_++);
   RunEvents events = ends_of(name);
   events.on_progress = [](const JobProgress&) {};
   events.on_tile = [](const std::string&) {};
   const auto run = std::make_shared<WorkerRun>(
       WorkerRun::Assignment{
-          .job = name, .is_plan = true, .work = work, .time_limit = options_.plan_limit, .trace_id = trace_id},
+          .job = name, .is_plan = true, .work = work, .time_limit = options_.plan_limit, .trace_id = owner.trace_id},
       options_.worker, *content, std::move(events));
   add_run(run);
   if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {

@@ -51,8 +51,8 @@ class WorkerRun {
     store::Work work = {};
     std::optional<Clock::duration> time_limit = {};
     std::int64_t accepted_unix_ms = 0;                      ///< when the job was accepted; 0: it does not matter
-    std::vector<store::CheckpointRecord> checkpoints = {};  ///< of earlier attempts
     std::string trace_id = {};                              ///< of the call that asked for it
+    std::vector<store::CheckpointRecord> checkpoints = {};  ///< of earlier attempts
   };
   /// Whose fault it is that an attempt ended without an outcome.
   enum class Blame {

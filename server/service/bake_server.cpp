@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <grpc/grpc.h>
+#include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "server/service/rpc_watch.h"
+#include "server/service/tls_credentials.h"
 
 namespace radbake::service {
 namespace {
@@ -20,10 +22,15 @@ namespace {
 constexpr int kPoolThreads = 4;
 constexpr std::size_t kTransportQuotaBytes = std::size_t{256} << 20;
 constexpr int kMaxSendBytes = 4 << 20;
-constexpr int kMaxStreamsPerConnection = 200;
 constexpr int kKeepaliveMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
 constexpr int kMinPingIntervalMs = 30'000;
+constexpr int kHandshakeLimitMs = 20'000;
+// Of connections from elsewhere: one without calls is closed, and none stays for ever, so that a client's certificate
+// is looked at again. Clients connect anew by themselves, and resume watches and transfers.
+constexpr int kMaxIdleMs = 10 * 60'000;
+constexpr int kMaxAgeMs = 60 * 60'000;
+constexpr int kAgeGraceMs = 5 * 60'000;
 constexpr std::chrono::seconds kShutdownGrace{2};
 const char* const kServiceNames[] = {"radbake.v1.Content", "radbake.v1.Bakes", "radbake.v1.Server"};
 
@@ -37,6 +44,9 @@ Result<store::FileDescriptor> lock_folder(const std::filesystem::path& folder) {
   }
   return file;
 }
+
+/// What gRPC logs, as lines of our own log. Most of it is what peers do wrong: no error of this server.
+void log_of_grpc(gpr_log_func_args* line) { spdlog::warn("gRPC: {}", line->message); }
 
 void set_health(grpc::Server& server, bool is_serving) {
   grpc::HealthCheckServiceInterface* health = server.GetHealthCheckService();
@@ -53,12 +63,16 @@ Result<std::unique_ptr<BakeServer>> BakeServer::start(BakeServerOptions options)
   options.queue.spool_folder = options.data / "spool";
   options.disk.folder = options.data;
   options.disk.min_free_bytes = options.limits.min_free_disk_bytes;
+  // What the options say wrongly shows before anything is touched.
+  RADBAKE_ASSIGN_OR_RETURN(const access::ListenAddress where, access::resolve_listen_address(options.listen));
+  RADBAKE_RETURN_IF_ERROR(access::check_access(options.access, options.listen, where.is_local));
   std::unique_ptr<BakeServer> server(new BakeServer(std::move(options)));
-  RADBAKE_RETURN_IF_ERROR(server->run());
+  RADBAKE_RETURN_IF_ERROR(server->run(where));
   return server;
 }
 
-Result<void> BakeServer::run() {
+Result<void> BakeServer::run(const access::ListenAddress& where) {
+  RADBAKE_ASSIGN_OR_RETURN(gate_, Gate::open(options_.access));
   RADBAKE_ASSIGN_OR_RETURN(lock_, lock_folder(options_.data));
   RADBAKE_RETURN_IF_ERROR(start_admin());
   RADBAKE_RETURN_IF_ERROR(open_stores());
@@ -66,7 +80,7 @@ Result<void> BakeServer::run() {
   RADBAKE_RETURN_IF_ERROR(workers_service_->start());
   // Listen before jobs of an earlier server are taken up: an address in use must not cost them an attempt, and who asks
   // meanwhile is told to come again. Health says NOT_SERVING until then.
-  RADBAKE_RETURN_IF_ERROR(listen());
+  RADBAKE_RETURN_IF_ERROR(listen(where));
   RADBAKE_RETURN_IF_ERROR(queue_->start(*workers_service_));
   readiness_.clear(Obstacle::kRecovering);
   return {};
@@ -100,9 +114,10 @@ void BakeServer::make_services() {
   disk.problem = [queue = queue_.get()] { return queue->disk_problem(); };
   disk_ = std::make_unique<DiskWatch>(std::move(disk), readiness_);
   workers_service_ = std::make_unique<WorkersService>(*queue_, *pool_, *costs_, metrics_, limits);
-  content_service_ = std::make_unique<ContentService>(*content_, *pool_, *disk_, limits);
-  bakes_service_ = std::make_unique<BakesService>(*queue_, *content_, *pool_, *disk_, limits, options_.max_threads);
-  server_service_ = std::make_unique<ServerService>(limits);
+  content_service_ = std::make_unique<ContentService>(*gate_, *content_, *pool_, *disk_, limits);
+  bakes_service_ =
+      std::make_unique<BakesService>(*gate_, *queue_, *content_, *pool_, *disk_, limits, options_.max_threads);
+  server_service_ = std::make_unique<ServerService>(*gate_, *pool_, limits);
   has_parts_ = true;
 }
 
@@ -122,15 +137,18 @@ std::string BakeServer::metrics_page() {
   return metrics_.render(snapshot, readiness_);
 }
 
-Result<void> BakeServer::listen() {
+Result<void> BakeServer::listen(const access::ListenAddress& where) {
   // Never paid back: when the last gRPC object goes, the library stops its threads, and one that polls for a socket's
   // writes may be waited for as long as 10 s.
   grpc_init();
+  gpr_set_log_function(&log_of_grpc);
   grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  // It asks nobody who he is: only for this machine.
+  if (where.is_local) grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  RADBAKE_ASSIGN_OR_RETURN(credentials_, make_credentials(options_.access));
   grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(options_.listen, grpc::InsecureServerCredentials(), &port);
+  using Connections = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
+  acceptor_ = builder.experimental().AddExternalConnectionAcceptor(Connections::FROM_FD, credentials_);
   builder.RegisterService(content_service_.get());
   builder.RegisterService(bakes_service_.get());
   builder.RegisterService(server_service_.get());
@@ -140,9 +158,14 @@ Result<void> BakeServer::listen() {
   // Reflection is the one service with a blocking implementation: two threads are enough for it.
   builder.SetSyncServerOption(grpc::ServerBuilder::NUM_CQS, 1);
   builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 2);
-  // Otherwise a second server on the same port would quietly take every other connection.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxStreamsPerConnection);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(options_.limits.max_calls_per_connection));
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimitMs);
+  if (!where.is_local) {
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kMaxIdleMs);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, kMaxAgeMs);
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, kAgeGraceMs);
+  }
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -151,15 +174,15 @@ Result<void> BakeServer::listen() {
   interceptors.push_back(std::make_unique<RpcWatch>(metrics_));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   server_ = builder.BuildAndStart();
-  if (!server_ || port == 0) {
-    return Error{ErrorCode::kUnavailable, "cannot listen on '" + options_.listen +
-                                              "': not an address of this machine (host:port or unix:PATH), or in use"};
-  }
-  address_ = options_.listen;
-  if (!options_.listen.starts_with("unix:")) {
-    address_ = options_.listen.substr(0, options_.listen.rfind(':')) + ":" + std::to_string(port);
-  }
+  if (!server_) return internal_error("gRPC does not start a server");
   readiness_.listen([this](bool is_ready) { set_health(*server_, is_ready); });
+  RADBAKE_ASSIGN_OR_RETURN(access::Listening listening, access::listen_on(where));
+  listener_ = std::make_unique<access::Listener>(
+      std::move(listening), options_.limits.max_connections, [this](store::FileDescriptor connection) {
+        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+        parameters.fd = connection.release();
+        acceptor_->HandleNewConnection(&parameters);
+      });
   return {};
 }
 
@@ -180,6 +203,7 @@ void BakeServer::stop() {
   readiness_.set(Obstacle::kDraining, "the server is stopping");
   queue_->let_finish(options_.drain_grace);
   queue_->drain();
+  if (listener_) listener_->stop();
   server_->Shutdown(std::chrono::system_clock::now() + kShutdownGrace);
   workers_service_->stop();
 }

@@ -6,8 +6,9 @@
 #include "server/service/convert.h"
 #include "server/service/plan_reactor.h"
 #include "server/service/rpc_watch.h"
-#include "server/service/scene_check.h"
 #include "server/service/status.h"
+#include "server/service/unary_call.h"
+#include "server/service/visible_job.h"
 #include "server/service/watch_reactor.h"
 
 namespace radbake::service {
@@ -34,6 +35,10 @@ std::string client_of(const grpc::CallbackServerContext& context) {
   return {found->second.data(), std::min(found->second.size(), kMaxClientBytes)};
 }
 
+store::JobOwner owner_of(const access::Caller& caller, const grpc::CallbackServerContext& context) {
+  return {.tenant = caller.tenant, .client = client_of(context), .trace_id = trace_id_of(context)};
+}
+
 void set_place(const jobs::QueuePlace& place, v1::Bake& bake) {
   bake.set_queue_position(place.position);
   bake.set_expected_start_unix_ms(place.expected_start_unix_ms);
@@ -42,28 +47,18 @@ void set_place(const jobs::QueuePlace& place, v1::Bake& bake) {
 
 }  // namespace
 
-template <typename Body>
-grpc::ServerUnaryReactor* BakesService::run_on_pool(grpc::CallbackServerContext* context, Body body) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  pool_.post([context, reactor, body = std::move(body)] {
-    const grpc::Status admission = check_protocol(*context);
-    reactor->Finish(admission.ok() ? body() : admission);
-  });
-  return reactor;
-}
-
 grpc::ServerUnaryReactor* BakesService::SubmitBake(grpc::CallbackServerContext* context,
                                                    const v1::SubmitBakeRequest* request, v1::Bake* bake) {
   if (request->validate_only()) return validate(context, *request, *bake);
-  return run_on_pool(context, [this, context, request, bake] { return submit(*context, *request, *bake); });
+  return answer_on_pool(pool_, gate_, context, [this, context, request, bake](const access::Caller& caller) {
+    return submit(owner_of(caller, *context), *request, *bake);
+  });
 }
 
-grpc::Status BakesService::submit(const grpc::CallbackServerContext& context, const v1::SubmitBakeRequest& request,
-                                  v1::Bake& bake) {
+grpc::Status BakesService::submit(const store::JobOwner& owner, const v1::SubmitBakeRequest& request, v1::Bake& bake) {
   store::NewJob job;
   std::shared_ptr<jobs::Job> known;
-  job.owner.client = client_of(context);
-  job.owner.trace_id = trace_id_of(context);
+  job.owner = owner;
   if (auto status = admit(request, job, known); !status.ok()) return status;
   return known ? reply(known, bake) : reply(queue_.submit(job), bake);
 }
@@ -74,7 +69,9 @@ grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* co
   pool_.post([this, context, &request, &bake, reactor] {
     store::NewJob job;
     std::shared_ptr<jobs::Job> known;
-    grpc::Status status = check_protocol(*context);
+    const Admission admission = gate_.admit(*context);
+    job.owner = owner_of(admission.caller, *context);
+    grpc::Status status = admission.status;
     if (status.ok()) status = admit(request, job, known);
     if (status.ok()) {
       bake.set_label(job.label);
@@ -82,7 +79,7 @@ grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* co
       *bake.mutable_manifest() = request.manifest();
       *bake.mutable_settings() = request.settings();
     }
-    reactor->begin(status, job.owner.tenant, job.work, trace_id_of(*context));
+    reactor->begin(status, job.owner, job.work);
   });
   return reactor;
 }
@@ -113,16 +110,17 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
     return to_status(room.error(), "min_free_disk_bytes");
   }
 
-  const auto content = content_.of(job.owner.tenant);
-  if (!content.ok()) return to_status(content.error());
-  if (auto status = check_scene({request.manifest(), request.settings(), request.run()}, limits_, max_threads_,
-                                **content, job.work);
-      !status.ok()) {
-    return status;
-  }
+  const SceneRequest scene{request.manifest(), request.settings(), request.run()};
+  if (auto status = check(scene, job.owner.tenant, job.work); !status.ok()) return status;
   job.label = request.label();
   job.bake_key = make_bake_key(job.work);
   return grpc::Status::OK;
+}
+
+grpc::Status BakesService::check(const SceneRequest& scene, const std::string& tenant, store::Work& work) {
+  const auto content = content_.of(tenant);
+  if (!content.ok()) return to_status(content.error());
+  return check_scene(scene, limits_, max_threads_, **content, work);
 }
 
 grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* context,
@@ -130,45 +128,53 @@ grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* co
   auto* reactor = new PlanReactor(queue_, plan);
   pool_.post([this, context, request, reactor] {
     store::Work work;
-    grpc::Status status = check_protocol(*context);
-    const std::string tenant;
-    const auto content = content_.of(tenant);
-    if (status.ok() && !content.ok()) status = to_status(content.error());
-    if (status.ok()) {
-      status = check_scene({request->manifest(), request->settings(), request->run()}, limits_, max_threads_, **content,
-                           work);
-    }
-    reactor->begin(status, tenant, work, trace_id_of(*context));
+    const Admission admission = gate_.admit(*context);
+    const store::JobOwner owner = owner_of(admission.caller, *context);
+    grpc::Status status = admission.status;
+    if (status.ok()) status = check({request->manifest(), request->settings(), request->run()}, owner.tenant, work);
+    reactor->begin(status, owner, work);
   });
   return reactor;
 }
 
 grpc::ServerUnaryReactor* BakesService::GetBake(grpc::CallbackServerContext* context, const v1::GetBakeRequest* request,
                                                 v1::Bake* bake) {
-  return run_on_pool(context, [this, request, bake] {
-    const grpc::Status status = reply(queue_.find(request->name()), *bake);
-    if (status.ok() && bake->state() == v1::QUEUED) set_place(queue_.places()[bake->name()], *bake);
-    return status;
-  });
+  return answer_on_pool(pool_, gate_, context,
+                        [this, request, bake](const access::Caller& caller) { return get(caller, *request, *bake); });
+}
+
+grpc::Status BakesService::get(const access::Caller& caller, const v1::GetBakeRequest& request, v1::Bake& bake) {
+  const grpc::Status status = reply(find_visible(queue_, caller, request.name()), bake);
+  if (status.ok() && bake.state() == v1::QUEUED) set_place(queue_.places()[bake.name()], bake);
+  return status;
 }
 
 grpc::ServerUnaryReactor* BakesService::CancelBake(grpc::CallbackServerContext* context,
                                                    const v1::CancelBakeRequest* request, v1::Bake* bake) {
-  return run_on_pool(context, [this, request, bake] { return reply(queue_.cancel(request->name()), *bake); });
+  return answer_on_pool(pool_, gate_, context, [this, request, bake](const access::Caller& caller) {
+    const auto visible = find_visible(queue_, caller, request->name());
+    return reply(visible.ok() ? queue_.cancel(request->name()) : visible, *bake);
+  });
 }
 
 grpc::ServerUnaryReactor* BakesService::FinishBake(grpc::CallbackServerContext* context,
                                                    const v1::FinishBakeRequest* request, v1::Bake* bake) {
-  return run_on_pool(context, [this, request, bake] { return reply(queue_.finish(request->name()), *bake); });
+  return answer_on_pool(pool_, gate_, context, [this, request, bake](const access::Caller& caller) {
+    const auto visible = find_visible(queue_, caller, request->name());
+    return reply(visible.ok() ? queue_.finish(request->name()) : visible, *bake);
+  });
 }
 
 grpc::ServerUnaryReactor* BakesService::ListBakes(grpc::CallbackServerContext* context,
                                                   const v1::ListBakesRequest* request,
                                                   v1::ListBakesResponse* response) {
-  return run_on_pool(context, [this, request, response] { return list(*request, *response); });
+  return answer_on_pool(pool_, gate_, context, [this, request, response](const access::Caller& caller) {
+    return list(caller, *request, *response);
+  });
 }
 
-grpc::Status BakesService::list(const v1::ListBakesRequest& request, v1::ListBakesResponse& response) {
+grpc::Status BakesService::list(const access::Caller& caller, const v1::ListBakesRequest& request,
+                                v1::ListBakesResponse& response) {
   if (request.page_size() > kMaxPageSize) {
     return bad_field("page_size", std::to_string(request.page_size()) + " is above " + std::to_string(kMaxPageSize));
   }
@@ -182,7 +188,8 @@ grpc::Status BakesService::list(const v1::ListBakesRequest& request, v1::ListBak
     }
   }
   const std::uint32_t page_size = request.page_size() == 0 ? kDefaultPageSize : request.page_size();
-  auto records = queue_.list(std::nullopt, page_size + 1, before_id);
+  const auto whose = caller.role == access::Role::kAdmin ? std::nullopt : std::optional(caller.tenant);
+  auto records = queue_.list(whose, page_size + 1, before_id);
   if (!records.ok()) return to_status(records.error());
   if (records->size() > page_size) {
     records->pop_back();
@@ -199,7 +206,9 @@ grpc::Status BakesService::list(const v1::ListBakesRequest& request, v1::ListBak
 
 grpc::ServerWriteReactor<v1::WatchBakeResponse>* BakesService::WatchBake(grpc::CallbackServerContext* context,
                                                                          const v1::WatchBakeRequest* request) {
-  return WatchReactor::start(check_protocol(*context), queue_, pool_, *request);
+  Admission admission = gate_.admit(*context);
+  auto slot = watches_->take(admission);
+  return WatchReactor::start(admission, std::move(slot), queue_, pool_, *request);
 }
 
 }  // namespace radbake::service

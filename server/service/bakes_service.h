@@ -3,7 +3,10 @@
 #include "common/base/limits.h"
 #include "radbake/v1/bake.grpc.pb.h"
 #include "server/jobs/job_queue.h"
+#include "server/service/call_slots.h"
 #include "server/service/disk_watch.h"
+#include "server/service/gate.h"
+#include "server/service/scene_check.h"
 #include "server/store/task_pool.h"
 #include "server/store/tenant_content.h"
 
@@ -13,9 +16,16 @@ namespace radbake::service {
 class BakesService : public v1::Bakes::CallbackService {
  public:
   /// max_threads: of a bake; 0: as many as it asks for.
-  BakesService(jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool, const DiskWatch& disk,
-               const Limits& limits, std::uint32_t max_threads)
-      : queue_(queue), content_(content), pool_(pool), disk_(disk), limits_(limits), max_threads_(max_threads) {}
+  BakesService(const Gate& gate, jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool,
+               const DiskWatch& disk, const Limits& limits, std::uint32_t max_threads)
+      : gate_(gate),
+        queue_(queue),
+        content_(content),
+        pool_(pool),
+        disk_(disk),
+        limits_(limits),
+        max_threads_(max_threads),
+        watches_(CallSlots::make("max_watches", limits.max_watches, limits.max_watches_per_tenant)) {}
 
   grpc::ServerUnaryReactor* SubmitBake(grpc::CallbackServerContext* context, const v1::SubmitBakeRequest* request,
                                        v1::Bake* bake) override;
@@ -33,24 +43,25 @@ class BakesService : public v1::Bakes::CallbackService {
                                                              const v1::WatchBakeRequest* request) override;
 
  private:
-  grpc::Status submit(const grpc::CallbackServerContext& context, const v1::SubmitBakeRequest& request, v1::Bake& bake);
-  /// Checks a submit as far as nothing is queued. known: the bake that the same request created before; then the rest
-  /// of the job is not filled in.
+  grpc::Status submit(const store::JobOwner& owner, const v1::SubmitBakeRequest& request, v1::Bake& bake);
+  /// Checks a submit as far as nothing is queued. job: its owner is known. known: the bake that the same request
+  /// created before; then the rest of the job is not filled in.
   grpc::Status admit(const v1::SubmitBakeRequest& request, store::NewJob& job, std::shared_ptr<jobs::Job>& known);
   grpc::ServerUnaryReactor* validate(grpc::CallbackServerContext* context, const v1::SubmitBakeRequest& request,
                                      v1::Bake& bake);
-  grpc::Status list(const v1::ListBakesRequest& request, v1::ListBakesResponse& response);
+  /// As check_scene(), with the blobs of a tenant.
+  grpc::Status check(const SceneRequest& scene, const std::string& tenant, store::Work& work);
+  grpc::Status get(const access::Caller& caller, const v1::GetBakeRequest& request, v1::Bake& bake);
+  grpc::Status list(const access::Caller& caller, const v1::ListBakesRequest& request, v1::ListBakesResponse& response);
 
-  /// Runs a call on the pool and finishes it with the status it returns.
-  template <typename Body>
-  grpc::ServerUnaryReactor* run_on_pool(grpc::CallbackServerContext* context, Body body);
-
+  const Gate& gate_;
   jobs::JobQueue& queue_;
   store::TenantContent& content_;
   store::TaskPool& pool_;
   const DiskWatch& disk_;
   const Limits limits_;
   const std::uint32_t max_threads_;
+  const std::shared_ptr<CallSlots> watches_;
 };
 
 }  // namespace radbake::service

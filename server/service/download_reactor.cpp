@@ -8,11 +8,16 @@
 
 namespace radbake::service {
 
-DownloadReactor::DownloadReactor(const grpc::Status& admission, store::ContentStore& content, store::TaskPool& pool,
-                                 std::uint64_t chunk_bytes, v1::DownloadRequest request)
-    : content_(content), pool_(pool), chunk_bytes_(chunk_bytes), request_(std::move(request)) {
-  if (!admission.ok()) {
-    Finish(admission);
+DownloadReactor::DownloadReactor(const Admission& admission, CallSlots::Slot slot, store::TenantContent& content,
+                                 store::TaskPool& pool, std::uint64_t chunk_bytes, v1::DownloadRequest request)
+    : slot_(std::move(slot)),
+      content_(content),
+      tenant_(admission.caller.tenant),
+      pool_(pool),
+      chunk_bytes_(chunk_bytes),
+      request_(std::move(request)) {
+  if (!admission.status.ok()) {
+    end(admission.status);
   } else {
     pool_.post([this] { open(); });
   }
@@ -21,16 +26,18 @@ DownloadReactor::DownloadReactor(const grpc::Status& admission, store::ContentSt
 void DownloadReactor::open() {
   const Digest digest = from_message(request_.digest());
   if (auto valid = validate_sha256(digest.sha256); !valid.ok()) {
-    return Finish(bad_field("digest", valid.error().message));
+    return end(bad_field("digest", valid.error().message));
   }
-  auto file = content_.open_blob(digest);
-  if (!file.ok()) return Finish(to_status(file.error()));
+  const auto content = content_.of(tenant_);
+  if (!content.ok()) return end(to_status(content.error()));
+  auto file = (*content)->open_blob(digest);
+  if (!file.ok()) return end(to_status(file.error()));
   file_ = std::move(file).value();
   position_ = request_.offset();
   if (position_ > digest.size_bytes) {
-    return Finish(grpc::Status(grpc::StatusCode::OUT_OF_RANGE,
-                               "offset " + std::to_string(position_) + " is beyond the " +
-                                   std::to_string(digest.size_bytes) + " bytes of blob " + digest.sha256));
+    return end(grpc::Status(grpc::StatusCode::OUT_OF_RANGE, "offset " + std::to_string(position_) + " is beyond the " +
+                                                                std::to_string(digest.size_bytes) + " bytes of blob " +
+                                                                digest.sha256));
   }
   const std::uint64_t rest = digest.size_bytes - position_;
   end_ = position_ + (request_.limit() == 0 ? rest : std::min<std::uint64_t>(request_.limit(), rest));
@@ -38,12 +45,12 @@ void DownloadReactor::open() {
 }
 
 void DownloadReactor::send_next() {
-  if (position_ == end_) return Finish(grpc::Status::OK);
+  if (position_ == end_) return end(grpc::Status::OK);
   const std::string& sha256 = request_.digest().sha256();
   auto bytes = store::read_range(file_.get(), position_, std::min(chunk_bytes_, end_ - position_), sha256);
-  if (!bytes.ok()) return Finish(to_status(bytes.error()));
+  if (!bytes.ok()) return end(to_status(bytes.error()));
   if (bytes->empty()) {
-    return Finish(to_status({ErrorCode::kDataLoss, "blob " + sha256 + " has lost bytes on the server's disk"}));
+    return end(to_status({ErrorCode::kDataLoss, "blob " + sha256 + " has lost bytes on the server's disk"}));
   }
   chunk_.set_offset(position_);
   position_ += bytes->size();
@@ -52,8 +59,13 @@ void DownloadReactor::send_next() {
 }
 
 void DownloadReactor::OnWriteDone(bool ok) {
-  if (!ok) return Finish(grpc::Status(grpc::StatusCode::CANCELLED, "the reader has gone"));
+  if (!ok) return end(grpc::Status(grpc::StatusCode::CANCELLED, "the reader has gone"));
   pool_.post([this] { send_next(); });
+}
+
+void DownloadReactor::end(const grpc::Status& status) {
+  slot_.give_back();
+  Finish(status);
 }
 
 }  // namespace radbake::service

@@ -3,9 +3,11 @@
 #include <grpcpp/grpcpp.h>
 
 #include "radbake/v1/content.pb.h"
-#include "server/store/content_store.h"
+#include "server/service/call_slots.h"
+#include "server/service/gate.h"
 #include "server/store/file_descriptor.h"
 #include "server/store/task_pool.h"
+#include "server/store/tenant_content.h"
 
 namespace radbake::service {
 
@@ -13,8 +15,8 @@ namespace radbake::service {
 /// chunk. Deletes itself.
 class DownloadReactor : public grpc::ServerWriteReactor<v1::DownloadChunk> {
  public:
-  DownloadReactor(const grpc::Status& admission, store::ContentStore& content, store::TaskPool& pool,
-                  std::uint64_t chunk_bytes, v1::DownloadRequest request);
+  DownloadReactor(const Admission& admission, CallSlots::Slot slot, store::TenantContent& content,
+                  store::TaskPool& pool, std::uint64_t chunk_bytes, v1::DownloadRequest request);
 
   void OnWriteDone(bool ok) override;
   void OnDone() override { delete this; }
@@ -23,7 +25,11 @@ class DownloadReactor : public grpc::ServerWriteReactor<v1::DownloadChunk> {
   void open();
   void send_next();
 
-  store::ContentStore& content_;
+  void end(const grpc::Status& status);
+
+  CallSlots::Slot slot_;
+  store::TenantContent& content_;
+  const std::string tenant_;
   store::TaskPool& pool_;
   const std::uint64_t chunk_bytes_;
   const v1::DownloadRequest request_;

@@ -4,11 +4,9 @@
 
 namespace radbake::service {
 
-void PlanReactor::begin(const grpc::Status& admission, const std::string& tenant, const store::Work& work,
-                        const std::string& trace_id) {
+void PlanReactor::begin(const grpc::Status& admission, const store::JobOwner& owner, const store::Work& work) {
   if (!admission.ok()) return Finish(admission);
-  const auto name = queue_.start_plan(
-      tenant, work, [this](const Result<std::string>& plan) { end(plan); }, trace_id);
+  const auto name = queue_.start_plan(owner, work, [this](const Result<std::string>& plan) { end(plan); });
   if (!name.ok()) return Finish(to_status(name.error(), "max_running_plans"));
   std::unique_lock lock(mutex_);
   is_begun_ = true;

@@ -16,8 +16,7 @@ class PlanReactor : public grpc::ServerUnaryReactor {
   PlanReactor(jobs::JobQueue& queue, v1::Plan* plan) : queue_(queue), plan_(plan) {}
 
   /// Starts the worker, or finishes with what spoke against it.
-  void begin(const grpc::Status& admission, const std::string& tenant, const store::Work& work,
-             const std::string& trace_id);
+  void begin(const grpc::Status& admission, const store::JobOwner& owner, const store::Work& work);
 
   void OnCancel() override;
   void OnDone() override { delete this; }

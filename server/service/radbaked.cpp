@@ -12,6 +12,7 @@
 
 #include "common/base/version.h"
 #include "common/log/log.h"
+#include "server/access/token_set.h"
 #include "server/service/bake_server.h"
 #include "server/service/notify.h"
 #include "server/service/server_config.h"
@@ -40,6 +41,16 @@ void wait_for_stop(const sigset_t& signals, pid_t parent, bool is_bound_to_paren
 int fail(const Error& error, int exit_code) {
   std::cerr << "radbaked: " << error.message << "\n";
   return exit_code;
+}
+
+/// Reads a token from stdin, up to the end of its line, and prints its hash for a file of tokens.
+int print_token_hash() {
+  std::string token;
+  std::getline(std::cin, token);
+  const auto hash = access::hash_token(token);
+  if (!hash.ok()) return fail(Error{hash.error().code, "hash-token: " + hash.error().message}, kExitUsage);
+  std::cout << *hash << "\n";
+  return 0;
 }
 
 int run(const ServerConfig& config, const sigset_t& signals, pid_t parent) {
@@ -87,6 +98,7 @@ int main(int argc, char** argv) {
     std::cout << *parsed->answer << std::flush;
     return 0;
   }
+  if (parsed->hashes_token) return print_token_hash();
   if (parsed->config.is_bound_to_parent) prctl(PR_SET_PDEATHSIG, SIGUSR1);
   return run(parsed->config, signals, parent);
 }

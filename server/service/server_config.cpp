@@ -75,8 +75,6 @@ void declare_limits(OptionList& options, Limits& limits) {
               "A message that the server receives");
   options.add("--max-digests-per-call", limits.max_digests_per_call, whole_number(1, 10'000), "Digests in FindMissing");
   options.add("--max-blob-bytes", limits.max_blob_bytes, byte_size(kMiB, kTiB), "A mesh, a texture, a layer");
-  options.add("--max-content-bytes", limits.max_content_bytes, byte_size(0, 1024 * kTiB),
-              "All blobs of a tenant, uploads included: what nobody needs makes room; 0: as the disk has");
   options.add("--max-manifest-bytes", limits.max_manifest_bytes, byte_size(kKiB, kGiB),
               "The list of what a scene consists of: the one thing of a client's that the server itself reads");
   options.add("--max-meshes", limits.max_meshes, whole_number(1, 1'000'000), "Meshes of a scene");
@@ -94,10 +92,41 @@ void declare_limits(OptionList& options, Limits& limits) {
               "Bakes that wait; a submit above it is refused");
   options.add("--max-running-bakes,--max-running", limits.max_running_bakes, whole_number(1, 1024),
               "Bakes at the same time");
+  options.add("--max-content-bytes", limits.max_content_bytes, byte_size(0, 1024 * kTiB),
+              "Scenes and results of a tenant; where an upload does not fit, what nobody needs is removed first; 0: as "
+              "the disk has");
   options.add("--max-running-plans", limits.max_running_plans, whole_number(1, 1024), "Plans at the same time");
+  constexpr std::uint64_t kMostCalls = 1'000'000;
+  options.add("--max-connections", limits.max_connections, whole_number(1, kMostCalls),
+              "Connections at the same time; one above is closed");
+  options.add("--max-calls-per-connection", limits.max_calls_per_connection, whole_number(1, kMostCalls),
+              "Calls at the same time on one connection");
+  options.add("--max-uploads", limits.max_uploads, whole_number(1, kMostCalls),
+              "Uploads at the same time; each holds a message of memory");
+  options.add("--max-uploads-per-tenant", limits.max_uploads_per_tenant, whole_number(1, kMostCalls), "Of one tenant");
+  options.add("--max-downloads", limits.max_downloads, whole_number(1, kMostCalls),
+              "Downloads at the same time; each holds a chunk of memory");
+  options.add("--max-downloads-per-tenant", limits.max_downloads_per_tenant, whole_number(1, kMostCalls),
+              "Of one tenant");
+  options.add("--max-watches", limits.max_watches, whole_number(1, kMostCalls), "Watches of bakes at the same time");
+  options.add("--max-watches-per-tenant", limits.max_watches_per_tenant, whole_number(1, kMostCalls), "Of one tenant");
   options.add("--min-free-disk-bytes,--min-free-disk", limits.min_free_disk_bytes, byte_size(0, 1024 * kTiB),
               "Free space on the data folder's disk, below which uploads and submits are refused and the server is "
               "not ready; 0: no such floor");
+}
+
+/// Who may call, and over what.
+void declare_access(CLI::App& app, OptionList& options, access::AccessOptions& access) {
+  options.add("--tls-cert", access.tls.certificate, path_of("a file"),
+              "Speak TLS with this certificate and its chain (PEM)");
+  options.add("--tls-key", access.tls.key, path_of("a file"), "Its private key (PEM, without a password)");
+  options.add("--tls-client-ca", access.tls.client_ca, path_of("a file"),
+              "Clients show certificates that these authorities signed: CN is the tenant, OU=admin an admin");
+  options.add("--tokens", access.tokens, path_of("a file"),
+              "Clients show bearer tokens: one 'SHA256 TENANT ROLE' a line, ROLE submit or admin");
+  app.add_flag("--insecure-listen", access.allows_insecure_listen,
+               "Listen where other machines can connect without TLS or without knowing who calls: only behind a proxy "
+               "that does both");
 }
 
 void declare_options(CLI::App& app, OptionList& options, ServerConfig& config) {
@@ -115,6 +144,13 @@ void declare_options(CLI::App& app, OptionList& options, ServerConfig& config) {
   options.add("--drain-grace", server.drain_grace, seconds(0, 86'400),
               "How long a server that is stopped lets bakes run that will be done by then; the others go back to the "
               "queue at once. With --exit-with-parent the default is 0");
+  options.add("--max-attempts", server.queue.max_failed_attempts, whole_number(1, 1'000'000),
+              "Workers that may die in a row over a bake that does not get on, until it fails");
+  options.add("--max-restarts", server.queue.max_lost_attempts, whole_number(1, 1'000'000),
+              "Ends of the server, not in good order, in a row over a bake that does not get on, until it fails");
+  options.add("--max-bake-memory-bytes,--max-bake-memory", server.queue.worker.limits.address_space_bytes,
+              byte_size(0, 1024 * kTiB), "Address space of a bake's worker; 0: as the machine has");
+  declare_access(app, options, server.access);
   declare_limits(options, server.limits);
   app.add_flag("--log-json", config.log.is_json, "Log JSON lines instead of text");
   options.add("--log-level", config.log.level, one_of({"trace", "debug", "info", "warning", "error", "off"}),
@@ -134,11 +170,13 @@ void describe_program(CLI::App& app) {
       "  radbaked --listen 127.0.0.1:0 --data /tmp/r  on a free port, which it prints\n"
       "  radbaked --listen unix:/run/radbake.sock --max-running 2 --threads 8 --log-json\n"
       "  radbaked --print-config > radbaked.conf      a file for --config, with every key\n"
+      "  radbaked --listen 0.0.0.0:7419 --tls-cert server.pem --tls-key server.key --tls-client-ca clients.pem\n"
+      "  head -c 32 /dev/urandom | base64 | tee token | radbaked --hash-token   makes a token for --tokens\n"
       "\n"
       "Prints 'radbaked VERSION listening on ADDRESS' when it is ready, and with --admin-listen 'radbaked VERSION\n"
       "admin on ADDRESS' below it; logs go to stderr. SIGTERM or Ctrl-C stops it: bakes that are nearly done end, the\n"
-      "others go back to the queue and run again at the next start. There is no authentication: listen on the\n"
-      "loopback or put a proxy in front.");
+      "others go back to the queue and run again at the next start. Where other machines can connect, --listen needs\n"
+      "TLS and certificates or tokens of clients; the files of both may change while it runs.");
 }
 
 Error contradiction(const std::string& key, const std::string& value, const std::string& expected) {
@@ -206,6 +244,8 @@ Result<ParsedConfig> parse_config(const std::vector<std::string>& arguments) {
   OptionList options(app, file);
   declare_options(app, options, config);
   bool prints_config = false;
+  app.add_flag("--hash-token", parsed.hashes_token, "Read a token from stdin, print its hash for --tokens, and end")
+      ->configurable(false);
   app.add_flag("--print-config", prints_config, "Print the configuration as it would be used, and end")
       ->configurable(false);
   try {

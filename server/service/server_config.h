@@ -21,6 +21,7 @@ struct ServerConfig {
 /// What a command line comes to.
 struct ParsedConfig {
   ServerConfig config;
+  bool hashes_token = false;          ///< --hash-token: do nothing else
   std::optional<std::string> answer;  ///< of --help, --version and --print-config: print it and end
 };
 

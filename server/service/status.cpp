@@ -31,30 +31,37 @@ grpc::StatusCode to_code(ErrorCode code) {
   return found == kCodes.end() ? grpc::StatusCode::INTERNAL : found->second;
 }
 
-grpc::Status with_detail(grpc::StatusCode code, const std::string& message, const google::protobuf::Message& detail) {
+template <typename... Details>
+grpc::Status with_details(grpc::StatusCode code, const std::string& message, const Details&... details) {
   google::rpc::Status status;
   status.set_code(code);
   status.set_message(message);
-  status.add_details()->PackFrom(detail);
+  (status.add_details()->PackFrom(details), ...);
   return {code, message, status.SerializeAsString()};
 }
 
-grpc::Status quota_failure(const std::string& limit, const std::string& message) {
+google::rpc::QuotaFailure quota_failure(const std::string& limit, const std::string& message) {
   google::rpc::QuotaFailure quota;
   auto* violation = quota.add_violations();
   violation->set_subject(limit);
   violation->set_description(message);
-  return with_detail(grpc::StatusCode::RESOURCE_EXHAUSTED, message, quota);
+  return quota;
+}
+
+google::rpc::RetryInfo retry_soon() {
+  google::rpc::RetryInfo retry;
+  retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
+  return retry;
 }
 
 }  // namespace
 
 grpc::Status to_status(const Error& error, const std::string& limit) {
-  if (error.code == ErrorCode::kResourceExhausted) return quota_failure(limit, error.message);
+  if (error.code == ErrorCode::kResourceExhausted) {
+    return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, error.message, quota_failure(limit, error.message));
+  }
   if (error.code == ErrorCode::kUnavailable) {
-    google::rpc::RetryInfo retry;
-    retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
-    return with_detail(grpc::StatusCode::UNAVAILABLE, error.message, retry);
+    return with_details(grpc::StatusCode::UNAVAILABLE, error.message, retry_soon());
   }
   return {to_code(error.code), error.message};
 }
@@ -66,10 +73,10 @@ grpc::Status missing_blobs(const std::vector<Digest>& missing) {
     violation->set_type("MISSING");
     violation->set_subject("blobs/" + missing[i].sha256 + "/" + std::to_string(missing[i].size_bytes));
   }
-  return with_detail(grpc::StatusCode::FAILED_PRECONDITION,
-                     std::to_string(missing.size()) + " blobs of the scene are not on the server, the first is " +
-                         missing.front().sha256 + ": upload them first",
-                     failure);
+  return with_details(grpc::StatusCode::FAILED_PRECONDITION,
+                      std::to_string(missing.size()) + " blobs of the scene are not on the server, the first is " +
+                          missing.front().sha256 + ": upload them first",
+                      failure);
 }
 
 grpc::Status bad_field(const std::string& field, const std::string& description) {
@@ -77,11 +84,17 @@ grpc::Status bad_field(const std::string& field, const std::string& description)
   auto* violation = bad.add_field_violations();
   violation->set_field(field);
   violation->set_description(description);
-  return with_detail(grpc::StatusCode::INVALID_ARGUMENT, field + ": " + description, bad);
+  return with_details(grpc::StatusCode::INVALID_ARGUMENT, field + ": " + description, bad);
 }
 
 grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uint64_t bound) {
-  return quota_failure(limit, std::to_string(value) + " is above " + limit + " " + std::to_string(bound));
+  const std::string message = std::to_string(value) + " is above " + limit + " " + std::to_string(bound);
+  return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, message, quota_failure(limit, message));
+}
+
+grpc::Status busy(const std::string& limit, std::uint64_t bound) {
+  const std::string message = "as many calls as " + limit + " " + std::to_string(bound) + " allows are going on";
+  return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, message, quota_failure(limit, message), retry_soon());
 }
 
 grpc::Status check_protocol(const grpc::CallbackServerContext& context) {

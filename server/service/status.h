@@ -26,6 +26,9 @@ grpc::Status bad_field(const std::string& field, const std::string& description)
 /// RESOURCE_EXHAUSTED with a QuotaFailure that names a limit and the value that is above it.
 grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uint64_t bound);
 
+/// RESOURCE_EXHAUSTED as above, for a limit on what goes on at the same time: with RetryInfo, as it frees up by itself.
+grpc::Status busy(const std::string& limit, std::uint64_t bound);
+
 /// OK unless the caller says (metadata radbake-protocol) that it speaks another major version than ours.
 grpc::Status check_protocol(const grpc::CallbackServerContext& context);
 

@@ -4,26 +4,34 @@
 
 #include "server/service/convert.h"
 #include "server/service/status.h"
+#include "server/service/visible_job.h"
 
 namespace radbake::service {
 
-WatchReactor* WatchReactor::start(const grpc::Status& admission, jobs::JobQueue& queue, store::TaskPool& pool,
-                                  v1::WatchBakeRequest request) {
-  const std::shared_ptr<WatchReactor> reactor(new WatchReactor(queue, pool, std::move(request)));
+WatchReactor* WatchReactor::start(const Admission& admission, CallSlots::Slot slot, jobs::JobQueue& queue,
+                                  store::TaskPool& pool, v1::WatchBakeRequest request) {
+  const std::shared_ptr<WatchReactor> reactor(
+      new WatchReactor(admission.caller, std::move(slot), queue, pool, std::move(request)));
   reactor->self_ = reactor;
-  if (!admission.ok()) {
-    reactor->finish(admission);
+  if (!admission.status.ok()) {
+    reactor->finish(admission.status);
   } else {
     pool.post([reactor] { reactor->open(); });
   }
   return reactor.get();
 }
 
-WatchReactor::WatchReactor(jobs::JobQueue& queue, store::TaskPool& pool, v1::WatchBakeRequest request)
-    : queue_(queue), pool_(pool), request_(std::move(request)), last_sequence_(request_.after_sequence()) {}
+WatchReactor::WatchReactor(access::Caller caller, CallSlots::Slot slot, jobs::JobQueue& queue, store::TaskPool& pool,
+                           v1::WatchBakeRequest request)
+    : slot_(std::move(slot)),
+      queue_(queue),
+      pool_(pool),
+      caller_(std::move(caller)),
+      request_(std::move(request)),
+      last_sequence_(request_.after_sequence()) {}
 
 void WatchReactor::open() {
-  auto job = queue_.find(request_.name());
+  auto job = find_visible(queue_, caller_, request_.name());
   if (!job.ok()) return finish(to_status(job.error()));
   {
     const std::lock_guard lock(mutex_);
@@ -59,6 +67,7 @@ void WatchReactor::OnDone() {
 
 void WatchReactor::finish(const grpc::Status& status) {
   is_finished_ = true;
+  slot_.give_back();
   Finish(status);
 }
 
@@ -75,6 +84,7 @@ void WatchReactor::step() {
   if (!*has_message) return;
   if (response_.has_finished()) {
     is_finished_ = true;
+    slot_.give_back();
     return StartWriteAndFinish(&response_, grpc::WriteOptions(), grpc::Status::OK);
   }
   is_writing_ = true;

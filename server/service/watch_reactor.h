@@ -8,6 +8,8 @@
 
 #include "radbake/v1/bake.pb.h"
 #include "server/jobs/job_queue.h"
+#include "server/service/call_slots.h"
+#include "server/service/gate.h"
 #include "server/store/task_pool.h"
 
 namespace radbake::service {
@@ -20,15 +22,16 @@ namespace radbake::service {
 class WatchReactor : public grpc::ServerWriteReactor<v1::WatchBakeResponse>,
                      public std::enable_shared_from_this<WatchReactor> {
  public:
-  static WatchReactor* start(const grpc::Status& admission, jobs::JobQueue& queue, store::TaskPool& pool,
-                             v1::WatchBakeRequest request);
+  static WatchReactor* start(const Admission& admission, CallSlots::Slot slot, jobs::JobQueue& queue,
+                             store::TaskPool& pool, v1::WatchBakeRequest request);
 
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
   void OnDone() override;
 
  private:
-  WatchReactor(jobs::JobQueue& queue, store::TaskPool& pool, v1::WatchBakeRequest request);
+  WatchReactor(access::Caller caller, CallSlots::Slot slot, jobs::JobQueue& queue, store::TaskPool& pool,
+               v1::WatchBakeRequest request);
 
   void open();
   void schedule_step();
@@ -37,8 +40,10 @@ class WatchReactor : public grpc::ServerWriteReactor<v1::WatchBakeResponse>,
   /// Fills response_ with what the reader lacks most; false if it lacks nothing.
   Result<bool> next_message();
 
+  CallSlots::Slot slot_;
   jobs::JobQueue& queue_;
   store::TaskPool& pool_;
+  const access::Caller caller_;
   const v1::WatchBakeRequest request_;
   std::shared_ptr<WatchReactor> self_;  // until OnDone
   std::atomic<bool> is_scheduled_ = false;

@@ -37,11 +37,11 @@ struct Work {
 
 /// Whose a job is, and how it is to be treated.
 struct JobOwner {
-  std::string tenant = {};  ///< empty: the server knows no tenants
-  std::string client = {};  ///< turns are shared out between clients: as it calls itself, within its tenant
-  std::string trace_id = {};
-  int priority = 0;       ///< higher: earlier
-  bool is_shared = true;  ///< its run and its result serve every job of the tenant with the same bake key
+  std::string tenant = {};    ///< empty: the server knows no tenants
+  std::string client = {};    ///< turns are shared out between clients: as it calls itself, within its tenant
+  std::string trace_id = {};  ///< of the call that submitted it
+  int priority = 0;           ///< higher: earlier
+  bool is_shared = true;      ///< its run and its result serve every job of the tenant with the same bake key
 };
 
 /// A job before it is accepted.

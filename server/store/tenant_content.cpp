@@ -30,6 +30,12 @@ void TenantContent::tell_make_room(const std::string& tenant, ContentStore& cont
   content.set_make_room([this, tenant, &content](std::uint64_t bytes) { make_room_(tenant, content, bytes); });
 }
 
+std::uint64_t TenantContent::upload_bytes() {
+  std::uint64_t total = 0;
+  for_each([&](const std::string&, ContentStore& content) { total += content.upload_bytes(); });
+  return total;
+}
+
 void TenantContent::for_each(const std::function<void(const std::string&, ContentStore&)>& visit) {
   std::vector<std::pair<std::string, ContentStore*>> stores;
   {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -19,6 +20,8 @@ class TenantContent {
   /// Opens the tenant's store where it is not. The server's own, of the empty name, always is. It stays open, and where
   /// it is. Errors: as ContentStore::open().
   Result<ContentStore*> of(const std::string& tenant);
+  /// Received of all uploads that are not complete, in the stores that are open.
+  std::uint64_t upload_bytes();
   /// Those that are open.
   void for_each(const std::function<void(const std::string& tenant, ContentStore& content)>& visit);
   /// As ContentStore's; for stores that are opened later, too.

@@ -204,7 +204,7 @@ class Container(unittest.TestCase):
     def test_image_says_how_it_is_run(self):
         self.assertEqual(CONFIG["User"], f"{USER}:{USER}")
         self.assertEqual(CONFIG["Entrypoint"], ["tini", "--", "radbaked"])
-        self.assertEqual(CONFIG["Cmd"], ["--listen", "0.0.0.0:7419", "--data", "/var/lib/radbake"])
+        self.assertEqual(CONFIG["Cmd"], ["--listen", "0.0.0.0:7419", "--insecure-listen", "--data", "/var/lib/radbake"])
         self.assertEqual(list(CONFIG["Volumes"]), ["/var/lib/radbake"])
         self.assertEqual(list(CONFIG["ExposedPorts"]), ["7419/tcp"])
         self.assertEqual(CONFIG["Healthcheck"]["Test"], ["CMD", "radbake", "capabilities", "--server", "127.0.0.1:7419"])

@@ -37,14 +37,12 @@ class ContentServiceTest : public ::testing::Test {
   /// Sends the first bytes of a blob and then leaves.
   void upload_part(const std::string& bytes, std::size_t size) {
     const auto context = new_context();
-    v1::UploadResult result;
-    const auto stream = client_.content->Upload(context.get(), &result);
+    const auto stream = client_.content->Upload(context.get());
     v1::UploadChunk chunk;
     *chunk.mutable_digest() = digest_message(bytes);
     chunk.set_data(bytes.substr(0, size));
     stream->Write(chunk);
-    stream->WritesDone();
-    EXPECT_EQ(stream->Finish().error_code(), grpc::INVALID_ARGUMENT);
+    EXPECT_EQ(finish_upload(*stream).error_code(), grpc::INVALID_ARGUMENT);
   }
 
   TemporaryFolder folder_;
@@ -91,16 +89,38 @@ TEST_F(ContentServiceTest, ResumesAnInterruptedUpload) {
 
 TEST_F(ContentServiceTest, RefusesBytesThatDoNotMatchTheirDigest) {
   const auto context = new_context();
-  v1::UploadResult result;
-  const auto stream = client_.content->Upload(context.get(), &result);
+  const auto stream = client_.content->Upload(context.get());
   v1::UploadChunk chunk;
   *chunk.mutable_digest() = digest_message("right");
   chunk.set_data("wrong");
   chunk.set_finish(true);
   stream->Write(chunk);
-  EXPECT_EQ(stream->Finish().error_code(), grpc::DATA_LOSS);
+  EXPECT_EQ(finish_upload(*stream).error_code(), grpc::DATA_LOSS);
   EXPECT_EQ(query("right").committed_bytes(), 0u);
   EXPECT_TRUE(client_.upload("right").ok());
+}
+
+TEST_F(ContentServiceTest, TellsHowFarAnUploadIsWhereItIsAsked) {
+  const auto context = new_context();
+  const auto stream = client_.content->Upload(context.get());
+  v1::UploadChunk chunk;
+  v1::UploadResult result;
+  *chunk.mutable_digest() = digest_message("in two parts");
+  chunk.set_wants_progress(true);
+  chunk.set_data("in two");
+  ASSERT_TRUE(stream->Write(chunk));
+  ASSERT_TRUE(stream->Read(&result));
+  EXPECT_EQ(result.committed_bytes(), 6u);
+  EXPECT_EQ(query("in two parts").committed_bytes(), 6u);
+  chunk.Clear();
+  chunk.set_offset(6);
+  chunk.set_data(" parts");
+  chunk.set_finish(true);
+  ASSERT_TRUE(stream->Write(chunk));
+  ASSERT_TRUE(stream->Read(&result));
+  EXPECT_EQ(result.committed_bytes(), 12u);
+  EXPECT_TRUE(finish_upload(*stream).ok());
+  EXPECT_TRUE(query("in two parts").complete());
 }
 
 TEST_F(ContentServiceTest, RefusesAGapAsOutOfRange) {
@@ -120,14 +140,13 @@ TEST_F(ContentServiceTest, NamesTheLimitThatAChunkIsAbove) {
 
 TEST_F(ContentServiceTest, RefusesABlobAboveTheLimitBeforeItsFirstByte) {
   const auto context = new_context();
-  v1::UploadResult result;
-  const auto stream = client_.content->Upload(context.get(), &result);
+  const auto stream = client_.content->Upload(context.get());
   v1::UploadChunk chunk;
   *chunk.mutable_digest() = digest_message("huge");
   chunk.mutable_digest()->set_size_bytes(std::uint64_t{1} << 40);
   chunk.set_data("h");
   stream->Write(chunk);
-  const grpc::Status status = stream->Finish();
+  const grpc::Status status = finish_upload(*stream);
   EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
   EXPECT_THAT(status.error_message(), ::testing::HasSubstr("max_blob_bytes"));
 }

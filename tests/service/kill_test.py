@@ -21,7 +21,7 @@ import tempfile
 import threading
 import time
 
-BIN, SERVER, ENCODE_SCENE, SCENES, STUBS = (pathlib.Path(argument) for argument in sys.argv[1:6])
+BIN, SERVER, ENCODE_SCENE, SCENES, STUBS = (pathlib.Path(argument).resolve() for argument in sys.argv[1:6])
 sys.path.insert(0, str(STUBS))
 
 import grpc  # noqa: E402
@@ -55,7 +55,7 @@ class Server:
         self.log = open(place / "log", "a")
         self.process = subprocess.Popen(
             [SERVER, "--listen", self.address, "--data", place / "data", "--worker", BIN / "radbake-worker",
-             "--max-attempts", "1000000"],
+             "--max-attempts", "1000000", "--max-restarts", "1000000"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.log, env=environment)
 
     def is_alive(self):
@@ -224,9 +224,10 @@ def disturb(place, clients, failpoints, num_kills, choices):
     """Lives of the server that end by kill -9. Returns how many kills there were of each kind."""
     kills = collections.Counter()
     kinds = failpoints + ["server", "worker", "worker", "worker"]
-    server = None
+    server, turn = None, 0
     while sum(kills.values()) < num_kills:
-        kind = kinds[sum(kills.values()) % len(kinds)]
+        kind = kinds[turn % len(kinds)]
+        turn += 1
         if kind in failpoints:
             if server:
                 server.kill()
@@ -260,8 +261,6 @@ def disturb(place, clients, failpoints, num_kills, choices):
                     kills[kind] += 1
                 except ProcessLookupError:
                     pass
-            else:
-                kills["nobody to kill"] += 0
     if server:
         server.kill()
     return kills

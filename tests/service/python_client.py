@@ -79,7 +79,7 @@ class Client:
         digest = digest_of(data)
         for attempt in range(TRIES):
             try:
-                result = self.content.Upload(self.chunks(data, self.committed_bytes(digest)))
+                *_, result = self.content.Upload(self.chunks(data, self.committed_bytes(digest)))
             except grpc.RpcError as error:
                 if error.code() != grpc.StatusCode.UNAVAILABLE or attempt + 1 == TRIES:
                     raise

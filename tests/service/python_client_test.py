@@ -70,7 +70,7 @@ class PythonClient(unittest.TestCase):
         data = bytes(range(256)) * 4096
         begun = content_pb2.UploadChunk(digest=digest_of(data), data=data[:self.client.limits.chunk_bytes])
         with self.assertRaises(grpc.RpcError):
-            self.client.content.Upload(iter([begun]), timeout=LIMIT_SECONDS)
+            list(self.client.content.Upload(iter([begun]), timeout=LIMIT_SECONDS))
         self.assertEqual(self.client.committed_bytes(digest_of(data)), self.client.limits.chunk_bytes)
         self.assertEqual([d.sha256 for d in self.client.find_missing([digest_of(data)])], [digest_of(data).sha256])
         result = self.client.upload(data)
@@ -81,7 +81,7 @@ class PythonClient(unittest.TestCase):
     def test_bytes_under_a_false_digest_are_refused(self):
         lie = content_pb2.UploadChunk(digest=digest_of(b"truth"), data=b"lying", finish=True)
         with self.assertRaises(grpc.RpcError) as refused:
-            self.client.content.Upload(iter([lie]), timeout=LIMIT_SECONDS)
+            list(self.client.content.Upload(iter([lie]), timeout=LIMIT_SECONDS))
         self.assertEqual(refused.exception.code(), grpc.StatusCode.DATA_LOSS)
         self.assertEqual(len(self.client.find_missing([digest_of(b"truth")])), 1)
 

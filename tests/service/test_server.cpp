@@ -1,25 +1,15 @@
 #include "tests/service/test_server.h"
 
+#include <grpcpp/support/client_interceptor.h>
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <atomic>
 #include <thread>
+#include <utility>
 
 #include "radbake/v1/scene.pb.h"
 
 namespace radbake::testing {
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "rbtest-XXXXXX").string();
-  EXPECT_NE(mkdtemp(name.data()), nullptr);
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 std::unique_ptr<grpc::ClientContext> new_context(const std::string& protocol) {
   auto context = std::make_unique<grpc::ClientContext>();
@@ -36,10 +26,45 @@ v1::Digest digest_message(const std::string& bytes) {
   return message;
 }
 
-TestClient::TestClient(const std::string& address) {
+namespace {
+
+/// Adds a bearer token to each call: gRPC's own way of doing so insists on TLS.
+class TokenInterceptor : public grpc::experimental::Interceptor {
+ public:
+  explicit TokenInterceptor(std::string token) : authorization_("Bearer " + std::move(token)) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    using grpc::experimental::InterceptionHookPoints;
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->emplace("authorization", authorization_);
+    }
+    methods->Proceed();
+  }
+
+ private:
+  const std::string authorization_;
+};
+
+class TokenInterceptors : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenInterceptors(std::string token) : token_(std::move(token)) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
+    return new TokenInterceptor(token_);
+  }
+
+ private:
+  const std::string token_;
+};
+
+}  // namespace
+
+TestClient::TestClient(const std::string& address, const std::string& token,
+                       const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // a connection of its own
-  channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  if (!token.empty()) interceptors.push_back(std::make_unique<TokenInterceptors>(token));
+  channel =
+      grpc::experimental::CreateCustomChannelWithInterceptors(address, credentials, arguments, std::move(interceptors));
   content = v1::Content::NewStub(channel);
   bakes = v1::Bakes::NewStub(channel);
   server = v1::Server::NewStub(channel);
@@ -48,8 +73,7 @@ TestClient::TestClient(const std::string& address) {
 grpc::Status TestClient::upload(const std::string& bytes, v1::UploadResult* result, std::size_t chunk,
                                 std::size_t offset) {
   const auto context = new_context();
-  v1::UploadResult own_result;
-  const auto stream = content->Upload(context.get(), result ? result : &own_result);
+  const auto stream = content->Upload(context.get());
   for (bool is_first = true; is_first || offset < bytes.size(); is_first = false, offset += chunk) {
     v1::UploadChunk message;
     if (is_first) *message.mutable_digest() = digest_message(bytes);
@@ -58,8 +82,14 @@ grpc::Status TestClient::upload(const std::string& bytes, v1::UploadResult* resu
     message.set_finish(offset + chunk >= bytes.size());
     if (!stream->Write(message)) break;
   }
-  stream->WritesDone();
-  return stream->Finish();
+  return finish_upload(*stream, result);
+}
+
+grpc::Status finish_upload(UploadStream& stream, v1::UploadResult* result) {
+  stream.WritesDone();
+  v1::UploadResult own_result;
+  while (stream.Read(result ? result : &own_result)) continue;
+  return stream.Finish();
 }
 
 v1::Digest TestClient::upload_scene() {

@@ -16,26 +16,19 @@
 #include "radbake/v1/server.grpc.pb.h"
 #include "server/service/bake_server.h"
 #include "tests/service/fake_worker.h"
+#include "tests/service/temporary_folder.h"
 
 namespace radbake::testing {
-
-/// A folder that is removed at the end, short enough for a Unix socket's path.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// No call of a test waits longer: a failure then, where it would hang.
 inline constexpr std::chrono::seconds kCallLimit{60};
 
 /// Everything that a client does, over the generated stubs.
 struct TestClient {
-  explicit TestClient(const std::string& address);
+  /// token: sent with each call, over whatever the credentials speak.
+  explicit TestClient(
+      const std::string& address, const std::string& token = "",
+      const std::shared_ptr<grpc::ChannelCredentials>& credentials = grpc::InsecureChannelCredentials());
 
   std::unique_ptr<v1::Content::Stub> content;
   std::unique_ptr<v1::Bakes::Stub> bakes;
@@ -78,12 +71,16 @@ class TestServer {
 
   explicit TestServer(const service::BakeServerOptions& options);
 
-  TestClient client() const { return TestClient(server_->address()); }
+  TestClient client(const std::string& token = "") const { return TestClient(server_->address(), token); }
   service::BakeServer& server() { return *server_; }
 
  private:
   std::unique_ptr<service::BakeServer> server_;
 };
+
+/// Ends the writing of an upload, takes what the server answers, the last of it into `result`, and gives its status.
+using UploadStream = grpc::ClientReaderWriter<v1::UploadChunk, v1::UploadResult>;
+grpc::Status finish_upload(UploadStream& stream, v1::UploadResult* result = nullptr);
 
 v1::Digest digest_message(const std::string& bytes);
 

@@ -62,10 +62,11 @@ grpc::Status FakeServer::FindMissing(Context* context, const v1::FindMissingRequ
   return unary(*context);
 }
 
-grpc::Status FakeServer::Upload(Context*, grpc::ServerReader<v1::UploadChunk>* reader, v1::UploadResult* response) {
+grpc::Status FakeServer::Upload(Context*, grpc::ServerReaderWriter<v1::UploadResult, v1::UploadChunk>* stream) {
   v1::UploadChunk chunk;
+  v1::UploadResult answer;
   std::string sha256;
-  while (reader->Read(&chunk)) {
+  while (stream->Read(&chunk)) {
     const std::scoped_lock lock(mutex_);
     if (chunk.has_digest()) {
       sha256 = chunk.digest().sha256();
@@ -80,11 +81,15 @@ grpc::Status FakeServer::Upload(Context*, grpc::ServerReader<v1::UploadChunk>* r
       if (forget_broken_uploads) bytes.clear();
       return kAway;
     }
-    if (!chunk.finish()) continue;
+    answer.set_committed_bytes(bytes.size());
+    if (!chunk.finish()) {
+      stream->Write(answer);
+      continue;
+    }
     if (digest_of(bytes).sha256 != sha256) return {grpc::StatusCode::DATA_LOSS, "wrong digest"};
-    response->set_committed_bytes(bytes.size());
     blobs[sha256] = std::move(bytes);
     partial_.erase(sha256);
+    stream->Write(answer);
   }
   return {};
 }

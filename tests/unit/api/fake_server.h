@@ -54,7 +54,7 @@ class FakeServer final : v1::Content::Service, v1::Bakes::Service, v1::Server::S
 
   grpc::Status GetCapabilities(Context*, const v1::GetCapabilitiesRequest*, v1::Capabilities*) override;
   grpc::Status FindMissing(Context*, const v1::FindMissingRequest*, v1::FindMissingResponse*) override;
-  grpc::Status Upload(Context*, grpc::ServerReader<v1::UploadChunk>*, v1::UploadResult*) override;
+  grpc::Status Upload(Context*, grpc::ServerReaderWriter<v1::UploadResult, v1::UploadChunk>* stream) override;
   grpc::Status QueryUpload(Context*, const v1::QueryUploadRequest*, v1::QueryUploadResponse*) override;
   grpc::Status Download(Context*, const v1::DownloadRequest*, grpc::ServerWriter<v1::DownloadChunk>*) override;
   grpc::Status SubmitBake(Context*, const v1::SubmitBakeRequest*, v1::Bake*) override;

@@ -43,7 +43,7 @@ TEST_F(QueueStatsTest, AsksToTryAgainUntilItHasTakenUpOldJobs) {
   JobQueue queue(options_, *jobs_, *content_);
   for (const Error& error : {queue.submit(job("new")).error(), queue.find(name).error(), queue.cancel(name).error(),
                              queue.finish(name).error(), queue.find_request("", "old", "").error(),
-                             queue.start_plan("", {}, [](const Result<std::string>&) {}).error()}) {
+                             queue.start_plan({}, {}, [](const Result<std::string>&) {}).error()}) {
     EXPECT_EQ(error.code, ErrorCode::kUnavailable);
     EXPECT_THAT(error.message, HasSubstr("the server is starting"));
   }
@@ -56,7 +56,7 @@ TEST_F(QueueStatsTest, RefusesNewJobsAndPlansAndLeavesThoseThatWaitOnceItIsToEnd
   ASSERT_TRUE(queue.start(gate_).ok());
   queue.refuse_new();
   for (const Error& error :
-       {queue.submit(job("new")).error(), queue.start_plan("", {}, [](const Result<std::string>&) {}).error()}) {
+       {queue.submit(job("new")).error(), queue.start_plan({}, {}, [](const Result<std::string>&) {}).error()}) {
     EXPECT_EQ(error.code, ErrorCode::kUnavailable);
     EXPECT_THAT(error.message, HasSubstr("the server is stopping"));
   }

@@ -46,7 +46,7 @@ Result<PlannedBake> plan_scene(const Scene& scene, const BakeOptions& options, s
 }
 
 Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, BakeObserver& observer,
-                               std::stop_token stop, std::stop_token finish) {
+                               std::stop_token stop, std::stop_token finish, Checkpoints*) {
   num_fake_tiles = 0;
   fake_saw_stop = false;
   fake_time_budget_seconds = options.time_budget_seconds;

@@ -664,7 +664,8 @@ class SharedServer(CliTest):
     def test_a_trace_goes_from_the_caller_to_the_servers_log(self):
         trace = "4bf92f3577b34da6a3ce929d0e0e4736"
         for i, (header, is_ours) in enumerate(((f"00-{trace}-00f067aa0ba902b7-01", True), ("not one", False))):
-            result = self.run_cli("submit", CORNELL, "-o", self.place / f"out{i}", "--json", *QUICK, TRACEPARENT=header)
+            result = self.run_cli("submit", CORNELL, "-o", self.place / f"out{i}", "--json", "--no-cache", *QUICK,
+                                  TRACEPARENT=header)
             self.assert_exit(result, 0)
             submitted = json.loads(result.stdout.splitlines()[0])
             self.assertRegex(submitted["trace_id"], "^[0-9a-f]{32}$")

@@ -15,6 +15,7 @@
 
 #include "common/base/check.h"
 #include "common/codec/scene_codec.h"
+#include "server/radiosity/bake/row_checkpoint.h"
 #include "tests/fuzz/attacks.h"
 #include "tests/unit/codec/codec_scenes.h"
 
@@ -264,6 +265,36 @@ void write_chunk_streams(const Folder& folder) {
   folder.write("result_without_end", large);
 }
 
+void write_row_blocks(const Folder& folder) {
+  // As row_block_target.cpp has it.
+  constexpr std::uint64_t kFingerprint = 7;
+  std::vector<radiosity::TakenRow> rows(100);
+  std::vector<std::uint32_t> patches;
+  for (std::uint32_t i = 0; i < rows.size(); i += 9) {
+    radiosity::TakenRow& taken = rows[i];
+    for (std::uint32_t k = 0; k < i; k += 7) taken.row.entries.push_back({k, 1.5F});
+    taken.row.counted = 64;
+    taken.length = static_cast<std::uint32_t>(taken.row.entries.size());
+    taken.sample.reflectance = {0.5, 0.25, 0.125};
+    patches.push_back(i);
+  }
+  const std::string good = radiosity::write_row_block(kFingerprint, patches, rows);
+  folder.write("rows", good);
+  folder.write("no_rows", radiosity::write_row_block(kFingerprint, {}, rows));
+  folder.write("of_another_system", radiosity::write_row_block(kFingerprint + 1, patches, rows));
+  folder.write("broken_off", good.substr(0, good.size() / 2));
+  std::string claims = good;
+  for (std::size_t at = 16; at < 24; ++at) claims[at] = '\x7f';
+  folder.write("rows_of_half_the_range", claims);
+  rows[9].row.entries = {{99, 1}, {98, 1}};
+  folder.write("entries_out_of_order", radiosity::write_row_block(kFingerprint, {9}, rows));
+  rows[9].row.entries = {{100, 1}};
+  folder.write("entry_of_no_patch", radiosity::write_row_block(kFingerprint, {9}, rows));
+  rows[9].row.entries = {};
+  rows[9].sample.reflectance = {1, 1, 1};
+  folder.write("reflects_all", radiosity::write_row_block(kFingerprint, {9}, rows));
+}
+
 void write_gltf_files(const Folder& folder) {
   std::string nested;
   for (int i = 0; i < 10'000; ++i) nested += "[";
@@ -296,5 +327,6 @@ int main(int argc, char** argv) {
   radbake::write_draco(radbake::Folder(folder / "draco"));
   radbake::write_manifests(radbake::Folder(folder / "manifest"));
   radbake::write_chunk_streams(radbake::Folder(folder / "chunk_stream"));
+  radbake::write_row_blocks(radbake::Folder(folder / "row_block"));
   radbake::write_gltf_files(radbake::Folder(folder / "gltf"));
 }

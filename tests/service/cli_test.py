@@ -39,7 +39,8 @@ class CliTest(unittest.TestCase):
         self.cache = pathlib.Path(tempfile.mkdtemp(prefix="radbake-cache-"))
         self.addCleanup(shutil.rmtree, self.cache, ignore_errors=True)
         self.env = {**os.environ, "TMPDIR": str(self.tmp), "XDG_CACHE_HOME": str(self.cache)}
-        self.env.pop("RADBAKE_SERVER", None)
+        for name in ("SERVER", "TLS_CA", "TLS_CERT", "TLS_KEY", "TOKEN"):
+            self.env.pop(f"RADBAKE_{name}", None)
 
     def run_cli(self, *arguments, **environment):
         return subprocess.run([BIN / "radbake", *map(str, arguments)], env={**self.env, **environment},

@@ -16,7 +16,12 @@ using testing::IsEmpty;
 
 class Options : public testing::Test {
  protected:
-  void SetUp() override { unsetenv("RADBAKE_SERVER"); }
+  void SetUp() override {
+    for (const char* name :
+         {"RADBAKE_SERVER", "RADBAKE_TLS_CA", "RADBAKE_TLS_CERT", "RADBAKE_TLS_KEY", "RADBAKE_TOKEN"}) {
+      unsetenv(name);
+    }
+  }
 
   static std::vector<std::string> submit_with(std::vector<std::string> more) {
     std::vector<std::string> arguments = {"submit", "scene.glb", "-o", "out"};
@@ -291,6 +296,25 @@ TEST_F(Options, ReadsWhatIsCompared) {
     EXPECT_THAT(refused({"compare", "reference.exr", "map.exr", "--scale", scale}).err, HasSubstr(scale));
   }
   EXPECT_EQ(refused({"compare", "reference.exr"}).code, kUsage);
+}
+
+TEST_F(Options, TakeSecurityFromTheLineAndElseFromTheEnvironment) {
+  setenv("RADBAKE_TLS_CA", "their-ca.pem", 1);
+  setenv("RADBAKE_TOKEN", "a-token", 1);
+  const api::ClientSecurity given =
+      accepted({"list", "--server", "bakery", "--tls-ca", "ca.pem", "--tls-cert", "me.pem", "--tls-key", "me.key"})
+          .security;
+  EXPECT_EQ(given.ca, "ca.pem");
+  EXPECT_EQ(given.certificate, "me.pem");
+  EXPECT_EQ(given.key, "me.key");
+  EXPECT_EQ(given.token, "a-token");
+  EXPECT_EQ(accepted({"list", "--server", "bakery"}).security.ca, "their-ca.pem");
+  // A private server asks nobody who he is.
+  EXPECT_EQ(accepted({"capabilities"}).security.token, "");
+  setenv("RADBAKE_TOKEN", "no token", 1);
+  EXPECT_THAT(refused({"list", "--server", "bakery"}).err, HasSubstr("RADBAKE_TOKEN"));
+  EXPECT_THAT(refused({"list", "--server", "bakery", "--token-file", "/nonexistent/token"}).err,
+              HasSubstr("--token-file /nonexistent/token"));
 }
 
 }  // namespace

@@ -45,6 +45,7 @@ void keep_grpc_up() {
 
 Call::Call(const Connection& connection, std::stop_token stop) : on_stop_(std::move(stop), Cancel{&context_}) {
   context_.AddMetadata("radbake-protocol", std::to_string(kProtocolMajor));
+  if (!connection.options.name.empty()) context_.AddMetadata("radbake-client", connection.options.name);
   if (!connection.options.traceparent.empty()) context_.AddMetadata("traceparent", connection.options.traceparent);
   const std::string& token = connection.options.security.token;
   if (!token.empty()) context_.AddMetadata("authorization", "Bearer " + token);

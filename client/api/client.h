@@ -33,6 +33,7 @@ struct ClientOptions {
   std::chrono::milliseconds stream_patience{60000};  ///< sum of the delays without news on a transfer or a watch
   std::chrono::milliseconds call_deadline{30000};
   std::chrono::milliseconds plan_deadline{60000};
+  std::string name;         ///< as a queue knows this client, to share out turns: ASCII; empty: by its connection
   std::string traceparent;  ///< W3C, sent with every call; empty: the server makes one for each
   ClientSecurity security;
 };

@@ -1,3 +1,6 @@
+#include <unistd.h>
+
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -8,8 +11,20 @@
 namespace radbake::cli {
 namespace {
 
+/// "ada@bakery", of printable ASCII.
+std::string user_and_host() {
+  const char* user = std::getenv("USER");
+  char host[256] = {};
+  ::gethostname(host, sizeof host - 1);
+  std::string name = std::string(user != nullptr ? user : std::to_string(::getuid())) + '@' + host;
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c <= ' ' || c > '~'; }, '?');
+  return name;
+}
+
 api::ClientOptions client_options(const CommandLine& line, const TraceContext& trace) {
   api::ClientOptions options;
+  options.name = user_and_host();
   options.traceparent = to_traceparent(trace);
   options.security = line.security;
   options.plan_deadline = std::chrono::milliseconds(std::llround(1000 * line.plan_seconds));

@@ -48,6 +48,12 @@ Result<void> JobQueue::check_recovered() const {
 }
 
 Result<void> JobQueue::recover() {
+  // Turns go on where they were: what clients were served of late counts.
+  constexpr std::int64_t kLatelyMs = 3600 * 1000;
+  RADBAKE_ASSIGN_OR_RETURN(const auto counts, store_.ended_by_client(unix_ms_now() - kLatelyMs));
+  for (const auto& count : counts) {
+    waiting_.remember(client_of(count.tenant, count.client), static_cast<double>(count.num_ended) * usual_seconds_);
+  }
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<JobRecord> records, store_.unfinished());
   for (const JobRecord& record : records) {
     RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));

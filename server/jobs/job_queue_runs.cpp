@@ -17,7 +17,7 @@ using store::StateChange;
 
 void JobQueue::line_up(const std::shared_ptr<Job>& job) {
   const JobRecord record = job->record();
-  waiting_.push({record.name, record.owner.tenant + '\n' + record.owner.client, record.owner.priority, record.id});
+  waiting_.push({record.name, client_of(record.owner.tenant, record.owner.client), record.owner.priority, record.id});
 }
 
 void JobQueue::run_waiting_jobs() {
@@ -307,7 +307,7 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
     const double seconds = run->seconds();
     if (const auto charged = charged_.extract(name)) {
       const JobRecord record = find(name).ok() ? (*find(name))->record() : JobRecord{};
-      waiting_.settle(record.owner.tenant + '\n' + record.owner.client, charged.mapped(), seconds);
+      waiting_.settle(client_of(record.owner.tenant, record.owner.client), charged.mapped(), seconds);
     }
     constexpr double kNewest = 0.3;
     usual_seconds_ =

@@ -24,6 +24,8 @@ struct Waiting {
 class WaitingLine {
  public:
   void push(const Waiting& waiting);
+  /// What a client was served by an earlier server: before its first push().
+  void remember(const std::string& client, double seconds) { served_[client] = seconds; }
   /// False: it was not in the line.
   bool erase(const std::string& name);
   /// Precondition: not empty. `expected_seconds` is charged to its client until settle() tells better.

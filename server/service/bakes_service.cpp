@@ -22,7 +22,7 @@ constexpr std::uint32_t kDefaultPageSize = 100;
 constexpr std::uint32_t kMaxPageSize = 1000;
 
 grpc::Status reply(const Result<std::shared_ptr<jobs::Job>>& job, v1::Bake& bake) {
-  if (!job.ok()) return to_status(job.error(), "max_queued_bakes");
+  if (!job.ok()) return busy(job.error(), "max_queued_bakes");
   bake = to_message(**job);
   return grpc::Status::OK;
 }

@@ -7,7 +7,7 @@ namespace radbake::service {
 void PlanReactor::begin(const grpc::Status& admission, const store::JobOwner& owner, const store::Work& work) {
   if (!admission.ok()) return Finish(admission);
   const auto name = queue_.start_plan(owner, work, [this](const Result<std::string>& plan) { end(plan); });
-  if (!name.ok()) return Finish(to_status(name.error(), "max_running_plans"));
+  if (!name.ok()) return Finish(busy(name.error(), "max_running_plans"));
   std::unique_lock lock(mutex_);
   is_begun_ = true;
   name_ = *name;

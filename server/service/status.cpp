@@ -94,8 +94,15 @@ grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uin
 }
 
 grpc::Status busy(const std::string& limit, std::uint64_t bound) {
-  const std::string message = "as many calls as " + limit + " " + std::to_string(bound) + " allows are going on";
-  return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, message, quota_failure(limit, message), retry_soon());
+  return busy(Error{ErrorCode::kResourceExhausted,
+                    "as many calls as " + limit + " " + std::to_string(bound) + " allows are going on"},
+              limit);
+}
+
+grpc::Status busy(const Error& error, const std::string& limit) {
+  if (error.code != ErrorCode::kResourceExhausted) return to_status(error, limit);
+  return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, error.message, quota_failure(limit, error.message),
+                      retry_soon());
 }
 
 grpc::Status check_protocol(const grpc::CallbackServerContext& context) {

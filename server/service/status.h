@@ -28,6 +28,8 @@ grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uin
 
 /// RESOURCE_EXHAUSTED as above, for a limit on what goes on at the same time: with RetryInfo, as it frees up by itself.
 grpc::Status busy(const std::string& limit, std::uint64_t bound);
+/// The same of an error; of any other than kResourceExhausted as to_status().
+grpc::Status busy(const Error& error, const std::string& limit);
 
 /// OK unless the caller says (metadata radbake-protocol) that it speaks another major version than ours.
 grpc::Status check_protocol(const grpc::CallbackServerContext& context);

@@ -257,6 +257,21 @@ Result<std::vector<JobRecord>> JobStore::list(const std::optional<std::string>& 
   });
 }
 
+Result<std::vector<JobStore::ClientCount>> JobStore::ended_by_client(std::int64_t since_unix_ms) {
+  return thread_.run([&]() -> Result<std::vector<ClientCount>> {
+    RADBAKE_ASSIGN_OR_RETURN(Statement rows,
+                             database_.prepare("SELECT tenant, client, COUNT(*) FROM jobs WHERE state>=? AND "
+                                               "finished_unix_ms>=? AND is_from_store=0 GROUP BY tenant, client"));
+    rows.bind(1, static_cast<int>(JobState::kSucceeded)).bind(2, since_unix_ms);
+    std::vector<ClientCount> counts;
+    while (true) {
+      RADBAKE_ASSIGN_OR_RETURN(const bool has_row, rows.step());
+      if (!has_row) return counts;
+      counts.push_back({rows.bytes(0), rows.bytes(1), static_cast<std::uint64_t>(rows.integer(2))});
+    }
+  });
+}
+
 Result<std::vector<JobRecord>> JobStore::unfinished() {
   return thread_.run([&]() -> Result<std::vector<JobRecord>> {
     RADBAKE_ASSIGN_OR_RETURN(Statement rows, database_.prepare(std::string("SELECT ") + kColumns +

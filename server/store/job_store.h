@@ -44,6 +44,12 @@ class JobStore {
   /// Newest first, of one tenant or of all, without results and inputs; before_id 0: from the newest on.
   Result<std::vector<JobRecord>> list(const std::optional<std::string>& tenant, std::uint32_t num_jobs,
                                       std::int64_t before_id);
+  /// How many bakes of each client's ended since a time, but for those that the store answered.
+  struct ClientCount {
+    std::string tenant, client;
+    std::uint64_t num_ended = 0;
+  };
+  Result<std::vector<ClientCount>> ended_by_client(std::int64_t since_unix_ms);
   /// Every job that has not ended, oldest first.
   Result<std::vector<JobRecord>> unfinished();
 

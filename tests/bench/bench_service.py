@@ -6,6 +6,8 @@ PART is
   overhead  from the accepted submit to the last tile, over the seconds that the bake itself takes in `radbake-study bake`
             with the same settings: the Cornell box at 2 %, by turns
   cached    a submit of what has been baked: from the call to the answer, at the client
+  crowd     idle watchers, watchers that never read, connections above the limit: the server's memory, and what a call of
+            somebody else takes meanwhile
   load      many clients submit many small bakes to a server that is stopped, killed and started meanwhile: all end, each
             client gets its share, and how long a submit takes
 Needs python3-grpcio. Prints one JSON object.
@@ -17,6 +19,7 @@ import pathlib
 import random
 import re
 import signal
+import socket
 import statistics
 import subprocess
 import sys
@@ -120,6 +123,62 @@ def cached(build, place, arguments):
             "max_ms": 1e3 * max(times)}
 
 
+def crowd(build, place, arguments):
+    scene = Scene(build, place, "cornell.glb")
+    num_idle, num_deaf, max_connections, num_above = 1000, 50, 64, 200
+    server = Server(build, place, ["--max-watches", "2000", "--max-watches-per-tenant", "2000", "--max-connections",
+                                   str(max_connections)])
+    client = python_client.Client(server.address)
+    client.upload_missing(scene.blobs)
+    name = client.bakes.SubmitBake(scene.request("long", atlas_size=2048, max_error=0.005), timeout=CALL_SECONDS).name
+
+    def answer_ms():
+        times = []
+        for _ in range(50):
+            began = time.monotonic()
+            client.bakes.GetBake(bake_pb2.GetBakeRequest(name=name), timeout=CALL_SECONDS)
+            times.append(1e3 * (time.monotonic() - began))
+        return quantile(times, 0.5)
+
+    figures = {"alone_mib": server.peak_mib(), "alone_ms": answer_ms()}
+    # A connection carries 200 calls.
+    channels = [grpc.insecure_channel(server.address, [("grpc.use_local_subchannel_pool", 1)]) for _ in range(8)]
+    stubs = [python_client.bake_pb2_grpc.BakesStub(channel) for channel in channels]
+    idle = [stubs[i % 6].WatchBake(bake_pb2.WatchBakeRequest(name=name)) for i in range(num_idle)]
+    for watch in idle:
+        next(watch)
+    figures |= {"idle_watchers": num_idle, "with_idle_mib": server.peak_mib(), "with_idle_ms": answer_ms()}
+    # They take the first message, and then none: tiles of a bake of many megabytes wait for them.
+    deaf = [stubs[6].WatchBake(bake_pb2.WatchBakeRequest(name=name, include_tiles=True)) for _ in range(num_deaf)]
+    for watch in deaf:
+        next(watch)
+    time.sleep(20)
+    figures |= {"deaf_watchers": num_deaf, "with_deaf_mib": server.peak_mib(), "with_deaf_ms": answer_ms()}
+    host, port = server.address.split(":")
+    sockets = [socket.create_connection((host, int(port))) for _ in range(max_connections + num_above)]
+    time.sleep(2)
+    closed = 0
+    for connection in sockets:
+        connection.setblocking(False)
+        try:
+            closed += connection.recv(1 << 16) == b""
+        except ConnectionError:
+            closed += 1
+        except BlockingIOError:
+            pass
+    figures |= {"connections": len(sockets), "closed_at_once": closed, "with_connections_mib": server.peak_mib(),
+                "with_connections_ms": answer_ms(), "state": bake_pb2.BakeState.Name(
+                    client.bakes.GetBake(bake_pb2.GetBakeRequest(name=name), timeout=CALL_SECONDS).state)}
+    for connection in sockets:
+        connection.close()
+    for watch in idle + deaf:
+        watch.cancel()
+    for channel in channels:
+        channel.close()
+    server.end()
+    return figures
+
+
 class LoadClient(threading.Thread):
     """Submits its bakes at once, and waits for each, whatever becomes of the server."""
 
@@ -146,7 +205,7 @@ class LoadClient(threading.Thread):
             names = []
             for k in range(self.num_bakes):
                 # Each a bake of its own.
-                request = self.scene.request(f"{self.index}/{k}", atlas_size=64, rays=4, max_patches=64,
+                request = self.scene.request(f"{self.index}/{k}", atlas_size=64, rays=8, max_patches=64,
                                              seed=1 + self.index * self.num_bakes + k)
 
                 def submit():
@@ -205,7 +264,7 @@ def load(build, place, arguments):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=["overhead", "cached", "load"])
+    parser.add_argument("part", choices=["overhead", "cached", "crowd", "load"])
     parser.add_argument("--build", type=pathlib.Path, required=True)
     parser.add_argument("--clients", type=int, default=200)
     parser.add_argument("--bakes", type=int, default=2000)

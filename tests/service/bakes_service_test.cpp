@@ -237,6 +237,7 @@ TEST_F(BakesServiceTest, RefusesABakeThatTheQueueHasNoRoomFor) {
   const grpc::Status status = submit(client_.request_for(client_.upload_scene(), kSucceed));
   EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
   EXPECT_EQ(detail_of<google::rpc::QuotaFailure>(status)->violations(0).subject(), "max_queued_bakes");
+  EXPECT_TRUE(detail_of<google::rpc::RetryInfo>(status).has_value());
 }
 
 TEST_F(BakesServiceTest, CancelsAQueuedBakeAtOnce) {

@@ -63,5 +63,13 @@ TEST(WaitingLine, GivesNoCreditForRest) {
   EXPECT_THAT(line.order(kSeconds), ElementsAre("new 0", "busy 5", "new 1", "busy 6", "new 2", "busy 7"));
 }
 
+TEST(WaitingLine, GoesOnWithTheTurnsOfAnEarlierServer) {
+  WaitingLine line;
+  line.remember("served", 2 * kSeconds);
+  for (int i = 0; i < 3; ++i) line.push({"served " + std::to_string(i), "served", 0, i});
+  for (int i = 0; i < 3; ++i) line.push({"other " + std::to_string(i), "other", 0, 10 + i});
+  EXPECT_THAT(line.order(kSeconds), ElementsAre("other 0", "other 1", "served 0", "other 2", "served 1", "served 2"));
+}
+
 }  // namespace
 }  // namespace radbake::jobs

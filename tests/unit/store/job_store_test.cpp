@@ -171,6 +171,22 @@ TEST_F(JobStoreTest, AnswersWithAResultOnlyWhoMayShareIt) {
   EXPECT_THAT(*store_->outputs(answered.name), ::testing::ElementsAre(output));
 }
 
+TEST_F(JobStoreTest, CountsWhatItBakedForEachClient) {
+  NewJob job{"a", "body", "label", "key", {}, {.tenant = "one", .client = "me"}};
+  const JobRecord ended = *store_->create(job);
+  ASSERT_TRUE(store_->append_event(ended.name, {.state = JobState::kSucceeded}).ok());
+  job.request_id = "waits";
+  ASSERT_TRUE(store_->create(job).ok());
+  job.request_id = "answered";
+  ASSERT_TRUE(store_->create(job, &ended).ok());
+  const auto counts = *store_->ended_by_client(0);
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_EQ(counts[0].tenant, "one");
+  EXPECT_EQ(counts[0].client, "me");
+  EXPECT_EQ(counts[0].num_ended, 1u);
+  EXPECT_TRUE(store_->ended_by_client(ended.created_unix_ms + 1'000'000)->empty());
+}
+
 TEST_F(JobStoreTest, KnowsWhichBlobsAreNeeded) {
   const Digest input = digest_of(std::string("input")), other_input = digest_of(std::string("other input")),
                output = digest_of(std::string("output")), checkpoint = digest_of(std::string("rows"));

@@ -194,7 +194,7 @@ class LoadClient(threading.Thread):
                 return function()
             except grpc.RpcError as error:
                 if error.code() not in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED, grpc.StatusCode.UNKNOWN,
-                                        grpc.StatusCode.RESOURCE_EXHAUSTED):
+                                        grpc.StatusCode.RESOURCE_EXHAUSTED, grpc.StatusCode.DEADLINE_EXCEEDED):
                     raise
                 time.sleep(random.uniform(0.1, 0.5))
 

@@ -52,7 +52,7 @@ Result<void> JobQueue::recover() {
   constexpr std::int64_t kLatelyMs = 3600 * 1000;
   RADBAKE_ASSIGN_OR_RETURN(const auto counts, store_.ended_by_client(unix_ms_now() - kLatelyMs));
   for (const auto& count : counts) {
-    waiting_.remember(client_of(count.tenant, count.client), static_cast<double>(count.num_ended) * usual_seconds_);
+    waiting_.remember(client_of(count.tenant, count.client), static_cast<double>(count.num_ended));
   }
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<JobRecord> records, store_.unfinished());
   for (const JobRecord& record : records) {
@@ -205,7 +205,7 @@ std::map<std::string, QueuePlace> JobQueue::places() {
     }
     while (free_in.size() < options_.max_running) free_in.insert(0);
     std::uint32_t position = 0;
-    for (const std::string& name : waiting_.order(usual_seconds_)) {
+    for (const std::string& name : waiting_.order(1)) {
       const double starts_in = *free_in.begin();
       free_in.erase(free_in.begin());
       free_in.insert(starts_in + usual_seconds_);

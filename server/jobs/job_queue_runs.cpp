@@ -23,8 +23,9 @@ void JobQueue::line_up(const std::shared_ptr<Job>& job) {
 void JobQueue::run_waiting_jobs() {
   while (!is_refusing_ && !is_draining_ && disk_problem_.empty() && !waiting_.is_empty() &&
          num_running_ < options_.max_running) {
-    const std::string name = waiting_.pop(usual_seconds_).name;
-    charged_[name] = usual_seconds_;
+    // Turns count in usual bakes: seconds of an earlier server, when others were usual, would not compare.
+    const std::string name = waiting_.pop(1).name;
+    charged_[name] = 1;
     if (const auto job = find_live(name)) start_job(job);
   }
 }
@@ -304,10 +305,12 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   } else {
     --num_running_;
     if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
+    constexpr double kLeastSeconds = 1e-3;
     const double seconds = run->seconds();
     if (const auto charged = charged_.extract(name)) {
       const JobRecord record = find(name).ok() ? (*find(name))->record() : JobRecord{};
-      waiting_.settle(client_of(record.owner.tenant, record.owner.client), charged.mapped(), seconds);
+      waiting_.settle(client_of(record.owner.tenant, record.owner.client), charged.mapped(),
+                      seconds / std::max(usual_seconds_, kLeastSeconds));
     }
     constexpr double kNewest = 0.3;
     usual_seconds_ =

@@ -18,7 +18,7 @@ struct Waiting {
 /// Who is next: of the jobs of the highest priority that of the client that was served least, so that one who submits
 /// many does not keep others waiting; of a client's jobs the oldest.
 ///
-/// What a client was served is counted in seconds of its bakes. One who comes or comes back begins level with the least
+/// What a client was served is counted in usual bakes of its. One who comes or comes back begins level with the least
 /// served of those that wait: rest earns no credit.
 /// Source: start-time fair queueing, Goyal, Vin & Cheng 1996, with jobs for packets.
 class WaitingLine {

@@ -11,7 +11,7 @@ enum class AttemptEnd {
   kServerStopping,  ///< the job goes back to the queue
   kWorkerDied,      ///< by itself, without an outcome
   kWorkerKilled,    ///< it overstepped one of its limits
-  kDiskRefused,     ///< what it sent could not be kept
+  kServerFailed,    ///< could not start it or keep what it sent
 };
 
 /// Is told what becomes of jobs, for numbers about them. Calls come from the queue's thread and must be quick.

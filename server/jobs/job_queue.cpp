@@ -52,17 +52,14 @@ Result<void> JobQueue::recover() {
   constexpr std::int64_t kLatelyMs = 3600 * 1000;
   RADBAKE_ASSIGN_OR_RETURN(const auto counts, store_.ended_by_client(unix_ms_now() - kLatelyMs));
   for (const auto& count : counts) {
-    waiting_.remember(client_of(count.tenant, count.client), static_cast<double>(count.num_ended));
+    waiting_.remember(scoped(count.tenant, count.client), static_cast<double>(count.num_ended));
   }
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<JobRecord> records, store_.unfinished());
   for (const JobRecord& record : records) {
     RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
     const auto job = std::make_shared<Job>(record, std::move(events));
     const auto leader = record.owner.is_shared ? find_leader(record.owner, record.bake_key) : nullptr;
-    {
-      const std::lock_guard lock(mutex_);
-      live_[record.name] = job;
-    }
+    add_live(job);
     if (is_running(record.state)) {
       const std::uint32_t lost = record.lost_attempts + (leader ? 0 : 1);
       if (lost >= options_.max_lost_attempts) {
@@ -72,15 +69,14 @@ Result<void> JobQueue::recover() {
         continue;
       }
       RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kQueued,
-                                           .attempt = record.attempt + 1,
-                                           .lost_attempts = lost,
                                            .message = "the server ended unexpectedly; queued again",
-                                           .failed_attempts = record.failed_attempts}));
+                                           .attempt = record.attempt + 1,
+                                           .lost_attempts = lost}));
     }
     if (leader) {
       follow(job, leader);
     } else {
-      line_up(job);
+      line_up(record);
     }
   }
   run_waiting_jobs();
@@ -142,19 +138,23 @@ Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) 
   RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job));
   RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
   const auto job = std::make_shared<Job>(record, std::move(events));
-  {
-    const std::lock_guard lock(mutex_);
-    live_[record.name] = job;
-  }
+  add_live(job);
   spdlog::info("{} queued: '{}', bake key {}", record.name, record.label, record.bake_key);
   if (leader) {
     follow(job, leader);
   } else {
-    line_up(job);
+    line_up(record);
     // The answer to the submit does not wait for the worker's start.
     thread_.post([this] { run_waiting_jobs(); });
   }
   return job;
+}
+
+void JobQueue::add_live(const std::shared_ptr<Job>& job) {
+  const JobRecord record = job->record();
+  if (record.owner.is_shared) sharers_[scoped(record.owner.tenant, record.bake_key)].push_back(job);
+  const std::lock_guard lock(mutex_);
+  live_[record.name] = job;
 }
 
 Result<std::optional<JobRecord>> JobQueue::find_result(const store::JobOwner& owner, const std::string& bake_key) {
@@ -205,7 +205,7 @@ std::map<std::string, QueuePlace> JobQueue::places() {
     }
     while (free_in.size() < options_.max_running) free_in.insert(0);
     std::uint32_t position = 0;
-    for (const std::string& name : waiting_.order(1)) {
+    for (const std::string& name : waiting_.order()) {
       const double starts_in = *free_in.begin();
       free_in.erase(free_in.begin());
       free_in.insert(starts_in + usual_seconds_);
@@ -238,16 +238,15 @@ void JobQueue::request_cancel(WorkerRun& run) {
 
 Result<void> JobQueue::cancel_live(const std::string& name) {
   const std::shared_ptr<Job> job = find_live(name);
-  if (!job || is_unsaved(job)) return {};
+  if (!job) return {};
+  if (is_unsaved(job)) {
+    return Error{ErrorCode::kUnavailable, "what became of " + name + " cannot be recorded yet: " + standstill_};
+  }
   if (const auto run = find_run(name)) {
     request_cancel(*run);
     return {};
   }
-  const JobRecord record = job->record();
-  RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kCancelled,
-                                       .attempt = record.attempt,
-                                       .lost_attempts = record.lost_attempts,
-                                       .message = "cancelled before it ran"}));
+  RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kCancelled, .message = "cancelled before it ran"}));
   waiting_.erase(name);
   leave_leader(job);
   return {};
@@ -285,13 +284,13 @@ Result<std::shared_ptr<WorkerRun>> JobQueue::greet(const WorkerHello& hello, std
 void JobQueue::watch_limits(std::stop_token stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    if (runs_.empty() && disk_problem_.empty()) {
-      runs_changed_.wait(lock, stop, [this] { return !runs_.empty() || !disk_problem_.empty(); });
+    if (runs_.empty() && standstill_.empty()) {
+      runs_changed_.wait(lock, stop, [this] { return !runs_.empty() || !standstill_.empty(); });
       continue;
     }
-    if (!disk_problem_.empty() && WorkerRun::Clock::now() - disk_tried_at_ >= options_.disk_retry) {
-      disk_tried_at_ = WorkerRun::Clock::now();
-      thread_.post([this] { retry_disk(); });
+    if (!standstill_.empty() && WorkerRun::Clock::now() - tried_at_ >= options_.retry_interval) {
+      tried_at_ = WorkerRun::Clock::now();
+      thread_.post([this] { try_again(); });
     }
     // A worker that was asked to stop has little time: look at it often.
     constexpr std::chrono::milliseconds kCancelCheck{5};
@@ -330,9 +329,9 @@ void JobQueue::drain() {
   for (const auto& [name, job] : live) job->close();
 }
 
-std::string JobQueue::disk_problem() const {
+std::string JobQueue::standstill() const {
   const std::lock_guard lock(mutex_);
-  return disk_problem_;
+  return standstill_;
 }
 
 }  // namespace radbake::jobs

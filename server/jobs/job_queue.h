@@ -39,9 +39,9 @@ struct QueueOptions {
   std::uint32_t max_lost_attempts = 5;    ///< a bake that takes the server down this often, without getting on, fails
   std::uint32_t max_failed_attempts = 3;  ///< and one whose worker dies this often
   std::chrono::milliseconds plan_limit{60'000};
-  std::chrono::milliseconds check_interval{100};  ///< how often workers are held against their limits
-  std::chrono::milliseconds disk_retry{1000};     ///< how often a disk that refused is tried again
-  JobObserver* observer = nullptr;                ///< may be null; outlives the queue
+  std::chrono::milliseconds check_interval{100};   ///< how often workers are held against their limits
+  std::chrono::milliseconds retry_interval{1000};  ///< how often what stands in the way is tried again
+  JobObserver* observer = nullptr;                 ///< may be null; outlives the queue
 };
 
 /// Where a job that waits stands.
@@ -64,8 +64,8 @@ struct QueueStats {
 ///
 /// A worker that dies or hangs ends its attempt; its job waits for the next one, which goes on from the checkpoints,
 /// and fails after some. A server that dies leaves jobs running on paper: the next one queues them again, too. Every
-/// change of state is on disk before a watcher sees it; while the disk refuses, nothing starts, and what ended is kept
-/// until it can be recorded.
+/// change of state is on disk before a watcher sees it; while the disk refuses, or no process can be started, nothing
+/// starts, and what ended is kept until it can be recorded.
 ///
 /// Jobs of one tenant with the same bake key share one run: one job leads, the others follow it and end as it does.
 /// Where such a job has ended well, its result is the answer.
@@ -95,7 +95,7 @@ class JobQueue {
                                              std::int64_t before_id);
   /// Of the jobs that wait or follow another.
   std::map<std::string, QueuePlace> places();
-  /// Asks a job to stop. No error if it has ended.
+  /// Asks a job to stop. No error if it has ended. Errors: kNotFound, kUnavailable while the disk refuses.
   Result<std::shared_ptr<Job>> cancel(const std::string& name);
   /// Asks a job to end with the best result that it has; one that waits is asked as soon as it runs. No error if it has
   /// ended. Errors: kNotFound.
@@ -123,8 +123,8 @@ class JobQueue {
   /// worker is left.
   void drain();
 
-  /// Why nothing starts at present: what the disk said; empty: all is well.
-  std::string disk_problem() const;
+  /// Why nothing starts at present: what the disk or the system said; empty: all is well.
+  std::string standstill() const;
 
  private:
   /// What ended and could not be recorded yet.
@@ -136,16 +136,19 @@ class JobQueue {
   // All of these run on thread_.
   Result<void> recover();
   Result<std::shared_ptr<Job>> accept_job(const store::NewJob& job);
+  void add_live(const std::shared_ptr<Job>& job);
   Result<void> cancel_live(const std::string& name);
   void finish_live(const std::string& name);
   void request_cancel(WorkerRun& run);
-  void line_up(const std::shared_ptr<Job>& job);
+  void line_up(const store::JobRecord& job);
   void run_waiting_jobs();
   void make_worker_ready();
   void start_job(const std::shared_ptr<Job>& job);
-  Result<std::shared_ptr<TileSpool>> begin_attempt(const std::shared_ptr<Job>& job, const store::JobRecord& record);
+  /// Makes what an attempt needs and records that it begins. Errors: the disk refuses, and nothing has changed.
+  Result<std::shared_ptr<WorkerRun>> begin_attempt(const std::shared_ptr<Job>& job);
   /// What every run tells at its end.
   RunEvents ends_of(const std::string& name);
+  RunEvents events_of(const std::shared_ptr<Job>& job, const std::shared_ptr<TileSpool>& spool);
   Result<std::string> start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done);
   void advance(const std::string& name, store::JobState state);
   void end_work(const std::string& name, WorkOutcome outcome);
@@ -162,8 +165,9 @@ class JobQueue {
   void fail(const std::shared_ptr<Job>& job, Error error);
   void keep_checkpoint(const std::string& name, std::uint32_t attempt, const store::CheckpointRecord& checkpoint);
   void drop_checkpoints(const std::string& name, const std::vector<std::string>& names);
-  void pause_for_disk(const Error& problem);
-  void retry_disk();
+  /// Starts nothing until try_again() finds that all is well.
+  void stand_still(const Error& problem);
+  void try_again();
 
   bool is_unsaved(const std::shared_ptr<Job>& job) const;
 
@@ -196,24 +200,25 @@ class JobQueue {
   std::map<std::string, std::shared_ptr<WorkerRun>> runs_;  // of jobs and plans
   bool is_draining_ = false;
   bool is_refusing_ = false;  // from refuse_new() on
-  std::string disk_problem_;
-  WorkerRun::Clock::time_point disk_tried_at_;
+  std::string standstill_;
+  WorkerRun::Clock::time_point tried_at_;
 
   // Touched on thread_ alone.
   WaitingLine waiting_;
   std::map<std::string, std::string> leaders_;  // [followers]
   std::deque<Unsaved> unsaved_;
-  std::map<std::string, double> charged_;      // [running] seconds that its client was charged ahead
-  double usual_seconds_ = kFirstGuessSeconds;  // of a bake, lately
-  std::set<std::string> to_finish_;            // of the jobs that have not ended
+  std::map<std::string, std::vector<std::shared_ptr<Job>>> sharers_;  // [shared key] live jobs, oldest first
+  std::map<std::string, std::string> turns_;                          // [running] whose turn it is
+  double usual_seconds_ = kFirstGuessSeconds;                         // of a bake, lately
+  std::set<std::string> to_finish_;                                   // of the jobs that have not ended
   std::map<std::string, PlanDone> plans_;
   std::unique_ptr<ReadyWorker> ready_;  // null: none, or given to a run
   std::uint32_t num_running_ = 0;
   std::uint64_t next_plan_ = 1;
 
   static constexpr double kFirstGuessSeconds = 10;
-  /// As the line of those that wait knows a client: no tenant's name has a line's end.
-  static std::string client_of(const std::string& tenant, const std::string& client) { return tenant + '\n' + client; }
+  /// A client's name or a bake key, of one tenant's: no tenant's name has a line's end.
+  static std::string scoped(const std::string& tenant, const std::string& name) { return tenant + '\n' + name; }
 
   std::jthread watchdog_;
   store::TaskPool thread_{1};

@@ -15,18 +15,16 @@ using store::JobRecord;
 using store::JobState;
 using store::StateChange;
 
-void JobQueue::line_up(const std::shared_ptr<Job>& job) {
-  const JobRecord record = job->record();
-  waiting_.push({record.name, client_of(record.owner.tenant, record.owner.client), record.owner.priority, record.id});
+void JobQueue::line_up(const JobRecord& job) {
+  waiting_.push({job.name, scoped(job.owner.tenant, job.owner.client), job.owner.priority, job.id});
 }
 
 void JobQueue::run_waiting_jobs() {
-  while (!is_refusing_ && !is_draining_ && disk_problem_.empty() && !waiting_.is_empty() &&
+  while (!is_refusing_ && !is_draining_ && standstill_.empty() && !waiting_.is_empty() &&
          num_running_ < options_.max_running) {
-    // Turns count in usual bakes: seconds of an earlier server, when others were usual, would not compare.
-    const std::string name = waiting_.pop(1).name;
-    charged_[name] = 1;
-    if (const auto job = find_live(name)) start_job(job);
+    const Waiting next = waiting_.pop();
+    turns_[next.name] = next.client;
+    if (const auto job = find_live(next.name)) start_job(job);
   }
 }
 
@@ -47,23 +45,14 @@ RunEvents JobQueue::ends_of(const std::string& name) {
   return events;
 }
 
-void JobQueue::start_job(const std::shared_ptr<Job>& job) {
+RunEvents JobQueue::events_of(const std::shared_ptr<Job>& job, const std::shared_ptr<TileSpool>& spool) {
   const JobRecord record = job->record();
-  const std::string name = record.name;
-  // The attempt is on disk before there is a worker that claims it.
-  auto begun = begin_attempt(job, record);
-  if (!begun.ok()) {
-    pause_for_disk(begun.error());
-    return line_up(job);
-  }
-  const std::shared_ptr<TileSpool> spool = std::move(begun).value();
-  job->set_tiles(spool);
-
+  const std::string& name = record.name;
   RunEvents events = ends_of(name);
-  events.on_progress = [this, job, last = JobState::kPreparing](const JobProgress& progress) mutable {
+  events.on_progress = [this, job, name, last = JobState::kPreparing](const JobProgress& progress) mutable {
     if (!is_running(progress.state)) return;
     if (std::exchange(last, progress.state) != progress.state) {
-      thread_.post([this, name = job->record().name, state = progress.state] { advance(name, state); });
+      thread_.post([this, name, state = progress.state] { advance(name, state); });
     }
     job->set_progress(progress);
   };
@@ -82,40 +71,50 @@ void JobQueue::start_job(const std::shared_ptr<Job>& job) {
   events.on_drop_checkpoints = [this, name](const std::vector<std::string>& names) {
     thread_.post([this, name, names] { drop_checkpoints(name, names); });
   };
-  auto content = content_.of(record.owner.tenant);
-  if (!content.ok()) {
-    pause_for_disk(content.error());
-    return queue_again(job, content.error().message, false);
+  return events;
+}
+
+Result<std::shared_ptr<WorkerRun>> JobQueue::begin_attempt(const std::shared_ptr<Job>& job) {
+  const JobRecord record = job->record();
+  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(record.owner.tenant));
+  RADBAKE_ASSIGN_OR_RETURN(std::vector<store::CheckpointRecord> checkpoints, store_.checkpoints(record));
+  std::erase_if(checkpoints, [&](const auto& left) { return !content->contains(left.digest); });
+  RADBAKE_ASSIGN_OR_RETURN(std::shared_ptr<TileSpool> spool, TileSpool::create(options_.spool_folder));
+  // The attempt is on disk before there is a worker that claims it.
+  RADBAKE_RETURN_IF_ERROR(
+      change(job, {.state = JobState::kPreparing, .message = "attempt " + std::to_string(record.attempt) + " starts"}));
+  job->set_tiles(spool);
+  return std::make_shared<WorkerRun>(WorkerRun::Assignment{.job = record.name,
+                                                           .attempt = record.attempt,
+                                                           .work = record.work,
+                                                           .accepted_unix_ms = record.created_unix_ms,
+                                                           .trace_id = record.owner.trace_id,
+                                                           .checkpoints = std::move(checkpoints)},
+                                     options_.worker, *content, events_of(job, spool));
+}
+
+void JobQueue::start_job(const std::shared_ptr<Job>& job) {
+  const JobRecord record = job->record();
+  auto begun = begin_attempt(job);
+  if (!begun.ok()) {
+    waiting_.settle(turns_.extract(record.name).mapped(), 0);
+    line_up(record);
+    return stand_still(begun.error());
   }
-  WorkerRun::Assignment assignment{.job = name,
-                                   .attempt = record.attempt,
-                                   .work = record.work,
-                                   .accepted_unix_ms = record.created_unix_ms,
-                                   .trace_id = record.owner.trace_id};
-  if (auto checkpoints = store_.checkpoints(record); checkpoints.ok()) {
-    assignment.checkpoints = std::move(checkpoints).value();
-    std::erase_if(assignment.checkpoints, [&](const auto& left) { return !(*content)->contains(left.digest); });
-  }
-  const auto run = std::make_shared<WorkerRun>(std::move(assignment), options_.worker, **content, std::move(events));
-  if (to_finish_.contains(name)) run->request_finish();
+  const std::shared_ptr<WorkerRun> run = std::move(begun).value();
+  if (to_finish_.contains(record.name)) run->request_finish();
   add_run(run);
   ++num_running_;
   store::failpoint("worker.starting");
   if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
-    fail(job, started.error());
-    end_run(name, {});
+    if (started.error().code == ErrorCode::kUnavailable) {
+      run->kill("could not be started: " + started.error().message, WorkerRun::Blame::kServer);
+    } else {
+      fail(job, started.error());
+    }
+    thread_.post([this, name = record.name] { end_run(name, {}); });
   }
   store::failpoint("worker.started");
-}
-
-Result<std::shared_ptr<TileSpool>> JobQueue::begin_attempt(const std::shared_ptr<Job>& job, const JobRecord& record) {
-  RADBAKE_ASSIGN_OR_RETURN(std::shared_ptr<TileSpool> spool, TileSpool::create(options_.spool_folder));
-  RADBAKE_RETURN_IF_ERROR(change(job, {.state = JobState::kPreparing,
-                                       .attempt = record.attempt,
-                                       .lost_attempts = record.lost_attempts,
-                                       .message = "attempt " + std::to_string(record.attempt) + " starts",
-                                       .failed_attempts = record.failed_attempts}));
-  return spool;
 }
 
 void JobQueue::advance(const std::string& name, JobState state) {
@@ -124,11 +123,7 @@ void JobQueue::advance(const std::string& name, JobState state) {
   const JobRecord record = job->record();
   // Passes go through the stages again; the record tells the furthest that was come to, and progress the present one.
   if (!is_running(record.state) || record.state >= state) return;
-  if (auto changed = change(job, {.state = state,
-                                  .attempt = record.attempt,
-                                  .lost_attempts = record.lost_attempts,
-                                  .failed_attempts = record.failed_attempts});
-      !changed.ok()) {
+  if (auto changed = change(job, {.state = state}); !changed.ok()) {
     spdlog::error("{}: {}", name, changed.error().message);
   }
 }
@@ -151,6 +146,10 @@ Result<void> JobQueue::change_one(const std::shared_ptr<Job>& job, const StateCh
   job->set_record(std::move(recorded.record), std::move(recorded.event));
   if (has_ended) {
     to_finish_.erase(name);
+    if (const auto sharers = sharers_.find(scoped(before.owner.tenant, before.bake_key)); sharers != sharers_.end()) {
+      std::erase(sharers->second, job);
+      if (sharers->second.empty()) sharers_.erase(sharers);
+    }
     const std::lock_guard lock(mutex_);
     live_.erase(name);
   }
@@ -170,23 +169,14 @@ Result<void> JobQueue::change(const std::shared_ptr<Job>& job, StateChange chang
     if (auto changed = change_one(follower, change); changed.ok() || !is_terminal(change.state)) continue;
     unsaved_.push_back({follower, change});
   }
-  if (is_terminal(change.state)) {
-    if (auto dropped = store_.drop_checkpoints(job->record()); !dropped.ok()) {
-      spdlog::warn("checkpoints stay: {}", dropped.error().message);
-    }
-  }
   return {};
 }
 
 void JobQueue::end_job(const std::shared_ptr<Job>& job, StateChange end) {
-  const JobRecord record = job->record();
-  end.attempt = record.attempt;
-  end.lost_attempts = record.lost_attempts;
-  end.failed_attempts = record.failed_attempts;
   if (auto changed = change(job, end); !changed.ok()) {
-    pause_for_disk(changed.error());
+    stand_still(changed.error());
     unsaved_.push_back({job, std::move(end)});
-  } else if (const auto run = find_run(record.name)) {
+  } else if (const auto run = find_run(job->record().name)) {
     run->accept();
   }
 }
@@ -202,43 +192,50 @@ bool JobQueue::is_unsaved(const std::shared_ptr<Job>& job) const {
 void JobQueue::queue_again(const std::shared_ptr<Job>& job, const std::string& why, bool has_failed) {
   const JobRecord record = job->record();
   StateChange again{.state = JobState::kQueued,
-                    .attempt = record.attempt + (is_running(record.state) ? 1 : 0),
-                    .lost_attempts = record.lost_attempts,
                     .message = why,
+                    .attempt = record.attempt + (is_running(record.state) ? 1 : 0),
                     .failed_attempts = record.failed_attempts + (has_failed ? 1 : 0)};
   if (auto changed = change(job, again); !changed.ok()) {
-    pause_for_disk(changed.error());
+    stand_still(changed.error());
     unsaved_.push_back({job, std::move(again)});
   } else if (!is_draining_) {
-    line_up(job);
+    line_up(record);
   }
 }
 
-void JobQueue::pause_for_disk(const Error& problem) {
+void JobQueue::stand_still(const Error& problem) {
   {
     const std::lock_guard lock(mutex_);
-    if (disk_problem_.empty()) spdlog::error("nothing starts until the disk is well again: {}", problem.message);
-    disk_problem_ = problem.message;
-    disk_tried_at_ = WorkerRun::Clock::now();
+    if (standstill_.empty()) spdlog::error("no bake starts for now: {}", problem.message);
+    standstill_ = problem.message;
+    tried_at_ = WorkerRun::Clock::now();
   }
   runs_changed_.notify_all();
 }
 
-void JobQueue::retry_disk() {
-  if (disk_problem_.empty()) return;
+void JobQueue::try_again() {
+  if (standstill_.empty()) return;
   if (auto content = content_.of(""); !content.ok() || !(*content)->probe().ok()) return;
   while (!unsaved_.empty()) {
     const auto [job, end] = unsaved_.front();
     if (!change(job, end).ok()) return;
     unsaved_.pop_front();
-    if (end.state == JobState::kQueued) line_up(job);
-    if (const auto run = find_run(job->record().name)) run->accept();
+    if (!is_terminal(end.state)) {
+      line_up(job->record());
+    } else if (const auto run = find_run(job->record().name)) {
+      run->accept();
+    }
+  }
+  if (!ready_ && !is_draining_) {
+    auto worker = ReadyWorker::start(options_.worker);
+    if (!worker.ok()) return;
+    ready_ = std::move(worker).value();
   }
   {
     const std::lock_guard lock(mutex_);
-    disk_problem_.clear();
+    standstill_.clear();
   }
-  spdlog::info("the disk is well again");
+  spdlog::info("bakes start again");
   run_waiting_jobs();
 }
 
@@ -298,8 +295,9 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   if (!run) return;
   const std::string killed_because = run->kill_reason();
   const LogTrace trace(run->assignment().trace_id);
+  const bool was_stopped = !killed_because.empty() && !exit.reason.empty();
   const std::string reason =
-      "the worker " + (killed_because.empty() ? exit.reason : killed_because + " and was stopped");
+      "the worker " + (killed_because.empty() ? exit.reason : killed_because) + (was_stopped ? " and was stopped" : "");
   if (run->assignment().is_plan) {
     finish_plan(name, run->is_cancel_requested() ? Error{ErrorCode::kCancelled, "cancelled"} : internal_error(reason));
   } else {
@@ -307,10 +305,8 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
     if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
     constexpr double kLeastSeconds = 1e-3;
     const double seconds = run->seconds();
-    if (const auto charged = charged_.extract(name)) {
-      const JobRecord record = find(name).ok() ? (*find(name))->record() : JobRecord{};
-      waiting_.settle(client_of(record.owner.tenant, record.owner.client), charged.mapped(),
-                      seconds / std::max(usual_seconds_, kLeastSeconds));
+    if (const auto turn = turns_.extract(name)) {
+      waiting_.settle(turn.mapped(), seconds / std::max(usual_seconds_, kLeastSeconds));
     }
     constexpr double kNewest = 0.3;
     usual_seconds_ =
@@ -333,7 +329,7 @@ void JobQueue::end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run
   if (is_draining_) return queue_again(job, "the server is stopping; goes on at its next start", false);
   switch (run.blame()) {
     case WorkerRun::Blame::kBake: return fail(job, internal_error(reason));
-    case WorkerRun::Blame::kServer: pause_for_disk(internal_error(reason)); return queue_again(job, reason, false);
+    case WorkerRun::Blame::kServer: stand_still(internal_error(reason)); return queue_again(job, reason, false);
     case WorkerRun::Blame::kWorker: break;
   }
   if (failed >= options_.max_failed_attempts) {

@@ -10,9 +10,10 @@ using store::JobRecord;
 using store::JobState;
 
 std::shared_ptr<Job> JobQueue::find_leader(const store::JobOwner& owner, const std::string& bake_key) const {
-  for (const auto& [name, job] : live_) {
-    const JobRecord record = job->record();
-    if (record.bake_key != bake_key || record.owner.tenant != owner.tenant || !record.owner.is_shared) continue;
+  const auto sharers = sharers_.find(scoped(owner.tenant, bake_key));
+  if (sharers == sharers_.end()) return nullptr;
+  for (const auto& job : sharers->second) {
+    const std::string name = job->record().name;
     if (leaders_.contains(name) || to_finish_.contains(name) || is_unsaved(job)) continue;
     const auto run = find_run(name);
     if (!run || !run->is_cancel_requested()) return job;
@@ -31,11 +32,7 @@ void JobQueue::follow(const std::shared_ptr<Job>& follower, const std::shared_pt
   leader->add_follower(follower);
   spdlog::info("{} shares the run of {}", own.name, leads.name);
   if (!is_running(leads.state)) return;
-  const auto changed = change_one(follower, {.state = leads.state,
-                                             .attempt = own.attempt,
-                                             .lost_attempts = own.lost_attempts,
-                                             .message = "shares the run of " + leads.name,
-                                             .failed_attempts = own.failed_attempts});
+  const auto changed = change_one(follower, {.state = leads.state, .message = "shares the run of " + leads.name});
   if (!changed.ok()) spdlog::error("{}: {}", own.name, changed.error().message);
 }
 

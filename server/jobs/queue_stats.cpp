@@ -20,7 +20,7 @@ AttemptEnd JobQueue::attempt_end_of(const WorkerRun& run) const {
   if (!job || is_unsaved(job)) return AttemptEnd::kOutcome;
   if (run.is_cancel_requested()) return AttemptEnd::kCancelled;
   if (is_draining_) return AttemptEnd::kServerStopping;
-  if (run.blame() == WorkerRun::Blame::kServer) return AttemptEnd::kDiskRefused;
+  if (run.blame() == WorkerRun::Blame::kServer) return AttemptEnd::kServerFailed;
   return run.kill_reason().empty() ? AttemptEnd::kWorkerDied : AttemptEnd::kWorkerKilled;
 }
 

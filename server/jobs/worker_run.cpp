@@ -58,7 +58,9 @@ Result<void> WorkerRun::start(WorkerGate& gate, std::unique_ptr<ReadyWorker> rea
       process_ = std::move(hired->process);
       socket = std::move(hired->socket);
     } else {
-      RADBAKE_ASSIGN_OR_RETURN(socket, start_process(std::move(handed.inputs)));
+      auto started = start_process(std::move(handed.inputs));
+      if (!started.ok()) return Error{ErrorCode::kUnavailable, started.error().message};
+      socket = std::move(started).value();
     }
   }
   gate.adopt(std::move(socket));
@@ -82,6 +84,8 @@ Result<store::FileDescriptor> WorkerRun::start_process(std::vector<int> inherite
 
 Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link) {
   const std::lock_guard lock(mutex_);
+  if (!process_)
+    return Error{ErrorCode::kFailedPrecondition, "the worker of " + assignment_.job + " is not started yet"};
   if (hello.attempt != assignment_.attempt || link_) {
     return Error{ErrorCode::kFailedPrecondition, assignment_.job + " is at attempt " +
                                                      std::to_string(assignment_.attempt) +

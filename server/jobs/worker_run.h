@@ -64,7 +64,8 @@ class WorkerRun {
   WorkerRun(Assignment assignment, const WorkerOptions& options, store::ContentStore& content, RunEvents events);
 
   /// Opens the inputs, takes the worker that is ready or starts one, and gives the server's end of its socket to the
-  /// gate. `ready`: may be null.
+  /// gate. `ready`: may be null. Errors: kUnavailable where the system starts no process now; others: an input cannot
+  /// be opened.
   Result<void> start(WorkerGate& gate, std::unique_ptr<ReadyWorker> ready = nullptr);
 
   // What the worker reports.
@@ -120,8 +121,8 @@ class WorkerRun {
   mutable std::mutex mutex_;  // guards what follows, down to process_
   WorkOrder order_;
   std::shared_ptr<WorkerLink> link_;
-  Clock::time_point started_at_;
-  Clock::time_point last_heard_at_;
+  Clock::time_point started_at_ = Clock::now();
+  Clock::time_point last_heard_at_ = started_at_;
   std::optional<Clock::time_point> cancel_requested_at_;
   bool is_finish_requested_ = false;
   std::optional<Clock::time_point> accepted_at_;

@@ -111,7 +111,7 @@ void BakeServer::make_services() {
   pool_ = std::make_unique<store::TaskPool>(kPoolThreads);
   costs_ = std::make_unique<CostFile>(options_.costs.empty() ? options_.data / "costs.txt" : options_.costs);
   DiskWatchOptions disk = options_.disk;
-  disk.problem = [queue = queue_.get()] { return queue->disk_problem(); };
+  disk.problem = [queue = queue_.get()] { return queue->standstill(); };
   disk_ = std::make_unique<DiskWatch>(std::move(disk), readiness_);
   workers_service_ = std::make_unique<WorkersService>(*queue_, *pool_, *costs_, metrics_, limits);
   content_service_ = std::make_unique<ContentService>(*gate_, *content_, *pool_, *disk_, limits);

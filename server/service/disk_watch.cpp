@@ -51,9 +51,9 @@ void DiskWatch::look() {
   }
   const std::string problem = options_.problem ? options_.problem() : "";
   if (problem.empty()) {
-    readiness_.clear(Obstacle::kDiskRefuses);
+    readiness_.clear(Obstacle::kStandstill);
   } else {
-    readiness_.set(Obstacle::kDiskRefuses, problem);
+    readiness_.set(Obstacle::kStandstill, problem);
   }
 }
 

@@ -23,12 +23,12 @@ struct DiskWatchOptions {
   std::uint64_t min_free_bytes = 0;  ///< 0: no floor
   std::chrono::milliseconds interval{1000};
   std::function<Result<std::uint64_t>(const std::filesystem::path&)> probe = free_disk_bytes;
-  std::function<std::string()> problem;  ///< what the disk refused to take of late; empty: nothing. May be null
+  std::function<std::string()> problem;  ///< why no bake starts; empty: they do. May be null
 };
 
 /// Looks at the data folder's disk again and again. Below the floor, or when it cannot be looked at, the server is not
-/// ready (Obstacle::kDiskFull) and admit() refuses; above it both end by themselves. Nor is it ready while the disk
-/// refuses what is to be recorded (Obstacle::kDiskRefuses). Thread-safe.
+/// ready (Obstacle::kDiskFull) and admit() refuses; above it both end by themselves. Nor is it ready while nothing can
+/// be recorded or started (Obstacle::kStandstill). Thread-safe.
 class DiskWatch {
  public:
   /// Looks once before it returns.

@@ -35,7 +35,7 @@ const char* label_of(jobs::AttemptEnd end) {
     case jobs::AttemptEnd::kServerStopping: return "server_stopping";
     case jobs::AttemptEnd::kWorkerDied: return "worker_died";
     case jobs::AttemptEnd::kWorkerKilled: return "worker_killed";
-    case jobs::AttemptEnd::kDiskRefused: return "disk_refused";
+    case jobs::AttemptEnd::kServerFailed: return "server_failed";
   }
   return "unknown";
 }
@@ -114,7 +114,7 @@ Metrics::Metrics()
   }
   for (const auto end :
        {jobs::AttemptEnd::kOutcome, jobs::AttemptEnd::kCancelled, jobs::AttemptEnd::kServerStopping,
-        jobs::AttemptEnd::kWorkerDied, jobs::AttemptEnd::kWorkerKilled, jobs::AttemptEnd::kDiskRefused}) {
+        jobs::AttemptEnd::kWorkerDied, jobs::AttemptEnd::kWorkerKilled, jobs::AttemptEnd::kServerFailed}) {
     attempts_ended_.Add({{"reason", label_of(end)}});
   }
   gauge("radbake_build_info", "1; the labels say what runs",

@@ -10,7 +10,7 @@ const char* obstacle_name(Obstacle obstacle) {
   switch (obstacle) {
     case Obstacle::kRecovering: return "recovering";
     case Obstacle::kDiskFull: return "disk_full";
-    case Obstacle::kDiskRefuses: return "disk_refuses";
+    case Obstacle::kStandstill: return "standstill";
     case Obstacle::kDraining: return "draining";
   }
   return "unknown";

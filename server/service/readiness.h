@@ -8,10 +8,10 @@
 namespace radbake::service {
 
 /// What keeps a server from taking work.
-enum class Obstacle { kRecovering, kDiskFull, kDiskRefuses, kDraining };
-inline constexpr Obstacle kObstacles[] = {Obstacle::kRecovering, Obstacle::kDiskFull, Obstacle::kDiskRefuses,
+enum class Obstacle { kRecovering, kDiskFull, kStandstill, kDraining };
+inline constexpr Obstacle kObstacles[] = {Obstacle::kRecovering, Obstacle::kDiskFull, Obstacle::kStandstill,
                                           Obstacle::kDraining};
-/// "recovering", "disk_full", "disk_refuses", "draining".
+/// "recovering", "disk_full", "standstill", "draining".
 const char* obstacle_name(Obstacle obstacle);
 
 /// Whether the server takes work, and if not, why. It does when nothing stands in its way; it begins as recovering.

@@ -55,6 +55,9 @@ grpc::Status check_settings(const v1::BakeSettings& settings, const v1::RunOptio
   if (const auto problem = settings::find_target_problem(settings)) {
     return bad_field(problem->field, problem->description);
   }
+  if (const auto problem = settings::find_size_problem(settings)) {
+    return bad_field(problem->field, problem->description);
+  }
   if (run.threads() > kMaxThreads) {
     return bad_field("run.threads", std::to_string(run.threads()) + " is above " + std::to_string(kMaxThreads));
   }

@@ -135,4 +135,24 @@ std::optional<FieldProblem> find_target_problem(const v1::BakeSettings& settings
   return std::nullopt;
 }
 
+std::optional<FieldProblem> find_size_problem(const v1::BakeSettings& settings) {
+  const auto below = [](std::string field, const std::string& value, const std::string& least) {
+    return FieldProblem{std::move(field), value + " is below " + least + "; 0: chosen for the scene"};
+  };
+  if (settings.rays() > 0 && settings.rays() < radiosity::kMinRays) {
+    return below("settings.rays", std::to_string(settings.rays()), std::to_string(radiosity::kMinRays));
+  }
+  if (settings.max_patches() > 0 && settings.max_patches() < radiosity::kMinMaxPatches) {
+    return below("settings.max_patches", std::to_string(settings.max_patches()),
+                 std::to_string(radiosity::kMinMaxPatches));
+  }
+  if (settings.texels_per_meter() > 0 && settings.texels_per_meter() < radiosity::kMinTexelsPerMeter) {
+    return below("settings.texels_per_meter", "the value", "0.000001");
+  }
+  if (settings.output() == v1::OUTPUT_VERTICES && settings.layers_size() > 0) {
+    return FieldProblem{"settings.layers", "layers are lightmaps, and with output OUTPUT_VERTICES there are none"};
+  }
+  return std::nullopt;
+}
+
 }  // namespace radbake::settings

@@ -28,6 +28,10 @@ std::optional<FieldProblem> find_effect_problem(const v1::BakeSettings& settings
 /// most kMaxTimeBudgetMs, and both choose the rays themselves. Empty: nothing is wrong.
 std::optional<FieldProblem> find_target_problem(const v1::BakeSettings& settings);
 
+/// Checks what the bake itself would refuse: fewer rays or patches, wider texels than its least, layers where there is
+/// no lightmap. Empty: nothing is wrong.
+std::optional<FieldProblem> find_size_problem(const v1::BakeSettings& settings);
+
 inline constexpr std::uint64_t kMaxTimeBudgetMs = std::uint64_t{30} * 24 * 3600 * 1000;
 
 }  // namespace radbake::settings

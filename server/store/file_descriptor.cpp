@@ -2,6 +2,8 @@
 
 #include <fcntl.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <system_error>
 
@@ -14,6 +16,8 @@ Error error_of(const std::string& what, const std::error_code& reason) {
   ErrorCode code = ErrorCode::kInternal;
   if (reason.value() == ENOSPC || reason.value() == EDQUOT) code = ErrorCode::kResourceExhausted;
   if (reason.value() == ENOENT) code = ErrorCode::kNotFound;
+  constexpr std::array kWantsOfTheMoment = {EMFILE, ENFILE, EAGAIN, ENOMEM};
+  if (std::ranges::find(kWantsOfTheMoment, reason.value()) != kWantsOfTheMoment.end()) code = ErrorCode::kUnavailable;
   return {code, what + ": " + reason.message()};
 }
 

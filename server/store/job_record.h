@@ -83,17 +83,18 @@ struct JobEvent {
   std::string message;  ///< for people
 };
 
-/// A change to be recorded: the event and everything that changes with it, in one transaction.
+/// A change to be recorded: the event and everything that changes with it, in one transaction. Counts that are not set
+/// stay as they are.
 struct StateChange {
   JobState state = JobState::kQueued;
-  std::uint32_t attempt = 1;
-  std::uint32_t lost_attempts = 0;
   std::string message = {};
+  std::optional<std::uint32_t> attempt = {};
+  std::optional<std::uint32_t> lost_attempts = {};
+  std::optional<std::uint32_t> failed_attempts = {};
   std::string result = {};           ///< with kSucceeded
   std::optional<Error> error = {};   ///< with kFailed
   std::vector<Digest> outputs = {};  ///< with kSucceeded: every blob that the result names
   bool is_whole = true;              ///< with kSucceeded: false where somebody ended it early
-  std::uint32_t failed_attempts = 0;
 };
 
 /// What an attempt left for the next one.

@@ -194,22 +194,25 @@ Result<RecordedChange> JobStore::append_event(const std::string& name, const Sta
     RecordedChange recorded;
     RADBAKE_RETURN_IF_ERROR(database_.in_transaction([&]() -> Result<void> {
       RADBAKE_ASSIGN_OR_RETURN(const JobRecord job, read_job("name=?", name));
-      recorded.event = {job.last_sequence + 1, unix_ms_now(), change.state, change.attempt, change.message};
+      const std::uint32_t attempt = change.attempt.value_or(job.attempt);
+      recorded.event = {job.last_sequence + 1, unix_ms_now(), change.state, attempt, change.message};
       RADBAKE_ASSIGN_OR_RETURN(
           Statement update,
           database_.prepare("UPDATE jobs SET state=?, attempt=?, lost_attempts=?, last_sequence=?, result=?, "
                             "error_code=?, error_message=?, finished_unix_ms=?, is_whole=?, failed_attempts=? "
                             "WHERE id=?"));
-      update.bind(1, static_cast<int>(change.state)).bind(2, change.attempt).bind(3, change.lost_attempts);
+      update.bind(1, static_cast<int>(change.state)).bind(2, attempt);
+      update.bind(3, change.lost_attempts.value_or(job.lost_attempts));
       update.bind(4, static_cast<std::int64_t>(recorded.event.sequence)).bind_bytes(5, change.result);
       update.bind(6, change.error ? static_cast<int>(change.error->code) : -1);
       update.bind_text(7, change.error ? change.error->message : "");
       update.bind(8, is_terminal(change.state) ? recorded.event.unix_ms : 0);
-      update.bind(9, change.state == JobState::kSucceeded && change.is_whole ? 1 : 0).bind(10, change.failed_attempts);
-      update.bind(11, job.id);
+      update.bind(9, change.state == JobState::kSucceeded && change.is_whole ? 1 : 0);
+      update.bind(10, change.failed_attempts.value_or(job.failed_attempts)).bind(11, job.id);
       RADBAKE_RETURN_IF_ERROR(update.execute());
       RADBAKE_RETURN_IF_ERROR(insert_event(job.id, recorded.event));
       RADBAKE_RETURN_IF_ERROR(insert_outputs(job.id, change.outputs));
+      if (is_terminal(change.state)) RADBAKE_RETURN_IF_ERROR(drop_checkpoints_of_nobody(job));
       RADBAKE_ASSIGN_OR_RETURN(recorded.record, read_job("name=?", name));
       return {};
     }));

@@ -34,7 +34,8 @@ class JobStore {
   /// with that one. Errors: kAlreadyExists for a known request_id.
   Result<JobRecord> create(const NewJob& job, const JobRecord* stored = nullptr);
 
-  /// Changes a job and appends the event of it, in one transaction. Errors: kNotFound.
+  /// Changes a job and appends the event of it, in one transaction; with the last unfinished job of a bake end its
+  /// checkpoints. Errors: kNotFound.
   Result<RecordedChange> append_event(const std::string& name, const StateChange& change);
 
   /// Errors: kNotFound.
@@ -65,8 +66,6 @@ class JobStore {
   /// In the place of an earlier one of that name; the job has got on: its lost and failed attempts count from 0 again.
   Result<void> put_checkpoint(const JobRecord& job, const CheckpointRecord& checkpoint);
   Result<void> drop_checkpoints(const JobRecord& job, const std::vector<std::string>& names);
-  /// All of a bake.
-  Result<void> drop_checkpoints(const JobRecord& job);
   Result<std::vector<CheckpointRecord>> checkpoints(const JobRecord& job);
 
   /// Forgets jobs of a tenant that ended before a time, at most so many, oldest first; how many there were.
@@ -78,6 +77,7 @@ class JobStore {
   Result<JobRecord> read_row(Statement& row);
   Result<JobRecord> with_inputs(JobRecord job);
   Result<void> insert_event(std::int64_t job, const JobEvent& event);
+  Result<void> drop_checkpoints_of_nobody(const JobRecord& ended);
   Result<void> insert_outputs(std::int64_t job, const std::vector<Digest>& outputs);
 
   Database database_;

@@ -106,13 +106,13 @@ Result<void> JobStore::drop_checkpoints(const JobRecord& job, const std::vector<
   });
 }
 
-Result<void> JobStore::drop_checkpoints(const JobRecord& job) {
-  return thread_.run([&]() -> Result<void> {
-    RADBAKE_ASSIGN_OR_RETURN(Statement drop,
-                             database_.prepare("DELETE FROM checkpoints WHERE tenant=? AND bake_key=?"));
-    drop.bind_text(1, job.owner.tenant).bind_text(2, checkpoint_key(job));
-    return drop.execute();
-  });
+Result<void> JobStore::drop_checkpoints_of_nobody(const JobRecord& ended) {
+  RADBAKE_ASSIGN_OR_RETURN(
+      Statement drop,
+      database_.prepare("DELETE FROM checkpoints WHERE tenant=?1 AND bake_key=?2 AND NOT EXISTS (SELECT 1 FROM jobs "
+                        "WHERE bake_key=?2 AND tenant=?1 AND is_shared=1 AND state<?3)"));
+  drop.bind_text(1, ended.owner.tenant).bind_text(2, checkpoint_key(ended)).bind(3, kSucceeded);
+  return drop.execute();
 }
 
 Result<std::vector<CheckpointRecord>> JobStore::checkpoints(const JobRecord& job) {

@@ -128,7 +128,7 @@ TEST(Health, SaysWhatTheDiskRefusedUntilItTakesItAgain) {
   options.interval = std::chrono::milliseconds(1);
   options.problem = [&] { return is_refusing ? std::string("fsync: Input/output error") : std::string(); };
   const service::DiskWatch watch(options, readiness);
-  EXPECT_EQ(readiness.why_not(), "disk_refuses: fsync: Input/output error\n");
+  EXPECT_EQ(readiness.why_not(), "standstill: fsync: Input/output error\n");
   EXPECT_TRUE(watch.admit().ok());
   is_refusing = false;
   const auto limit = std::chrono::steady_clock::now() + kCallLimit;

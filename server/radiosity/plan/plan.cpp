@@ -24,7 +24,7 @@ Result<void> check_range(const char* name, T value, T low, T high) {
 
 Result<void> check_options(const BakeOptions& options) {
   RADBAKE_RETURN_IF_ERROR(check_range("atlas size", options.atlas_size, kMinAtlasSize, kMaxAtlasSize));
-  RADBAKE_RETURN_IF_ERROR(check_range("texels per metre", options.texels_per_meter, 1e-6, 1e9));
+  RADBAKE_RETURN_IF_ERROR(check_range("texels per metre", options.texels_per_meter, kMinTexelsPerMeter, 1e9));
   RADBAKE_RETURN_IF_ERROR(check_range("rays", options.rays, kMinRays, kMaxRays));
   RADBAKE_RETURN_IF_ERROR(check_range("max patches", options.max_patches, kMinMaxPatches, 1 << 24));
   RADBAKE_RETURN_IF_ERROR(check_range("ambient occlusion distance", options.ao_distance, 1e-6, 1e9));

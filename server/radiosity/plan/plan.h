@@ -90,6 +90,7 @@ inline constexpr double kDefaultAoDistance = 1;  ///< metres
 inline constexpr int kMinAtlasSize = kMinSheet;
 inline constexpr int kMaxAtlasSize = kMaxSheet;
 inline constexpr double kDefaultTexelsPerMeter = 32;
+inline constexpr double kMinTexelsPerMeter = 1e-6;
 inline constexpr int kDefaultRays = 256;
 inline constexpr int kMinRays = 8;
 inline constexpr int kMaxRays = 65536;

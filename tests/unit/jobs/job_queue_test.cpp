@@ -1,143 +1,7 @@
-// The queue without a wire: workers are shell scripts, and the test takes the service's part.
-
-#include "server/jobs/job_queue.h"
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sys/stat.h>
-
-#include <fstream>
-#include <thread>
-
-#include "common/base/version.h"
-#include "tests/unit/store/temporary_folder.h"
+#include "tests/unit/jobs/job_queue_fixture.h"
 
 namespace radbake::jobs {
 namespace {
-
-using namespace std::chrono_literals;
-using store::JobState;
-using ::testing::HasSubstr;
-
-constexpr auto kWaitLimit = 60s;
-
-/// Keeps the sockets, so that they stay open.
-class FakeGate : public WorkerGate {
- public:
-  void adopt(store::FileDescriptor socket) override { sockets_.push_back(std::move(socket)); }
-
- private:
-  std::vector<store::FileDescriptor> sockets_;
-};
-
-struct FakeLink : WorkerLink {
-  void start(const WorkOrder& order) override {
-    num_inputs = order.inputs.size();
-    num_checkpoints = order.checkpoints.size();
-    waited_seconds = order.waited_seconds;
-    calls += "start ";
-  }
-  void cancel() override {
-    is_cancelled = true;
-    calls += "cancel ";
-  }
-  void finish() override {
-    is_finishing = true;
-    calls += "finish ";
-  }
-  void accept() override { is_accepted = true; }
-  std::atomic<std::size_t> num_inputs = 0, num_checkpoints = 0;
-  std::atomic<bool> is_cancelled = false, is_finishing = false, is_accepted = false;
-  std::atomic<double> waited_seconds = -1;
-  std::string calls;  // one at a time: the run calls under its lock
-};
-
-/// The database refuses every change, as on a full disk.
-class DatabaseOutage {
- public:
-  DatabaseOutage() {
-    store::fault_hook = [](const char*) { return ENOSPC; };
-  }
-  ~DatabaseOutage() { store::fault_hook = nullptr; }
-};
-
-class JobQueueTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    options_.max_failed_attempts = 1;
-    open("sleep 1000");
-  }
-
-  void write_worker(const std::string& script) {
-    std::ofstream(options_.worker.program) << "#!/bin/sh\n" << script << "\n";
-    chmod(options_.worker.program.c_str(), 0700);
-  }
-
-  /// Opens the queue as a server's start does, with workers that run a script.
-  void open(const std::string& script) {
-    queue_.reset();
-    jobs_.reset();
-    options_.worker.program = folder_.path() / "worker";
-    options_.spool_folder = folder_.path() / "spool";
-    options_.check_interval = 5ms;
-    options_.disk_retry = 5ms;
-    options_.worker.exit_grace = 50ms;
-    options_.worker.disconnect_grace = 50ms;
-    write_worker(script);
-    content_ = std::move(store::TenantContent::open(folder_.path(), {1 << 20, 0})).value();
-    jobs_ = std::move(store::JobStore::open(folder_.path() / "jobs.sqlite")).value();
-    queue_ = std::make_unique<JobQueue>(options_, *jobs_, *content_);
-    ASSERT_TRUE(queue_->start(gate_).ok());
-  }
-
-  std::shared_ptr<Job> submit(const std::string& request_id) { return submit(request_id, "key of " + request_id); }
-  std::shared_ptr<Job> submit(const std::string& request_id, const std::string& bake_key, bool is_shared = true) {
-    auto job = queue_->submit({request_id, "body", "label", bake_key, {}, {"", "me", "", 0, is_shared}});
-    EXPECT_TRUE(job.ok()) << job.error().message;
-    return std::move(job).value();
-  }
-
-  /// Of workers of its own.
-  static int num_starts_of(const std::shared_ptr<Job>& job) {
-    int count = 0;
-    for (const store::JobEvent& event : job->events_after(0)) count += event.message.ends_with(" starts");
-    return count;
-  }
-
-  static bool wait_until(const std::function<bool()>& condition) {
-    const auto limit = std::chrono::steady_clock::now() + kWaitLimit;
-    while (!condition()) {
-      if (std::chrono::steady_clock::now() > limit) return false;
-      std::this_thread::sleep_for(1ms);
-    }
-    return true;
-  }
-  static bool wait_for(const std::shared_ptr<Job>& job, JobState state) {
-    return wait_until([&] { return job->record().state == state; });
-  }
-  static std::string error_of(const std::shared_ptr<Job>& job) {
-    EXPECT_TRUE(wait_for(job, JobState::kFailed));
-    return job->record().error ? job->record().error->message : "";
-  }
-
-  std::shared_ptr<WorkerRun> greet(const std::shared_ptr<Job>& job, std::uint32_t attempt = 1) {
-    EXPECT_TRUE(wait_for(job, JobState::kPreparing));
-    Result<std::shared_ptr<WorkerRun>> run = internal_error("not tried");
-    EXPECT_TRUE(wait_until([&] {
-      run = queue_->greet({job->record().name, attempt, kEngineVersion, kProtocolMajor}, link_);
-      return run.ok();
-    }));
-    return run.ok() ? *run : nullptr;
-  }
-
-  store::TemporaryFolder folder_;
-  QueueOptions options_;
-  FakeGate gate_;
-  std::shared_ptr<FakeLink> link_ = std::make_shared<FakeLink>();
-  std::unique_ptr<store::TenantContent> content_;
-  std::unique_ptr<store::JobStore> jobs_;
-  std::unique_ptr<JobQueue> queue_;
-};
 
 TEST_F(JobQueueTest, RunsJobsInTheOrderInWhichTheyCame) {
   const auto first = submit("a"), second = submit("b"), third = submit("c"), fourth = submit("d");
@@ -305,7 +169,7 @@ TEST_F(JobQueueTest, GivesAJobUpThatTookTheServerDownTooOften) {
   queue_->drain();
   const std::string name = jobs_->create({"a", "body", "label", "key", {}})->name;
   // As a server that died leaves it.
-  ASSERT_TRUE(jobs_->append_event(name, {JobState::kGathering, 3, 4, "", "", {}}).ok());
+  ASSERT_TRUE(jobs_->append_event(name, {.state = JobState::kGathering, .attempt = 3, .lost_attempts = 4}).ok());
   open("sleep 1000");
   const store::JobRecord record = (*queue_->find(name))->record();
   EXPECT_EQ(record.state, JobState::kFailed);
@@ -353,66 +217,6 @@ TEST_F(JobQueueTest, GivesTheNextAttemptWhatTheLastOneLeft) {
   EXPECT_TRUE(jobs_->checkpoints(job->record())->empty());
 }
 
-TEST_F(JobQueueTest, RunsEqualJobsOnceAndEndsThemAlike) {
-  const auto leader = submit("a", "key"), follower = submit("b", "key"), other = submit("c", "other key");
-  const auto run = greet(leader);
-  ASSERT_NE(run, nullptr);
-  EXPECT_TRUE(wait_for(follower, JobState::kPreparing));
-  EXPECT_EQ(queue_->places()[follower->record().name].shares, leader->record().name);
-  JobProgress progress;
-  progress.state = JobState::kSolving;
-  progress.fraction = 0.5;
-  run->report_progress(progress);
-  EXPECT_EQ(follower->progress().progress.fraction, 0.5);
-  EXPECT_EQ(follower->tiles(), leader->tiles());
-  const std::string lightmap = "texels";
-  EXPECT_TRUE(run->report_chunk({"lightmap_0", 0, lightmap, digest_of(lightmap)}).ok());
-  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {digest_of(lightmap)});
-  for (const auto& job : {leader, follower}) {
-    EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
-    EXPECT_EQ(job->record().result, "result");
-  }
-  EXPECT_EQ(num_starts_of(follower), 0);
-  // And from now on without a worker.
-  EXPECT_TRUE(wait_for(other, JobState::kPreparing));
-  const auto later = submit("d", "key");
-  EXPECT_EQ(later->record().state, JobState::kSucceeded);
-  EXPECT_EQ(later->record().result, "result");
-  EXPECT_TRUE(later->record().is_from_store);
-  EXPECT_EQ(submit("e", "key", false)->record().state, JobState::kQueued);
-  // What is not there any more is baked again.
-  (*content_->of(""))->sweep({}, std::chrono::system_clock::now() + std::chrono::hours(1), 1000);
-  EXPECT_EQ(submit("f", "key")->record().state, JobState::kQueued);
-}
-
-TEST_F(JobQueueTest, LetsAFollowerGoOnWhereItsLeaderIsCancelled) {
-  const auto leader = submit("a", "key"), second = submit("b", "key"), third = submit("c", "key");
-  const auto run = greet(leader);
-  ASSERT_NE(run, nullptr);
-  ASSERT_TRUE(queue_->cancel(third->record().name).ok());
-  EXPECT_EQ(third->record().state, JobState::kCancelled);
-  ASSERT_TRUE(queue_->cancel(leader->record().name).ok());
-  EXPECT_TRUE(wait_for(leader, JobState::kCancelled));
-  link_ = std::make_shared<FakeLink>();
-  EXPECT_TRUE(wait_until([&] { return num_starts_of(second) == 1; }));
-  const auto own = greet(second, second->record().attempt);
-  ASSERT_NE(own, nullptr);
-  own->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
-  EXPECT_TRUE(wait_for(second, JobState::kSucceeded));
-  EXPECT_EQ(third->record().state, JobState::kCancelled);
-}
-
-TEST_F(JobQueueTest, GivesNobodyElseAResultThatSomebodyEndedEarly) {
-  const auto leader = submit("a", "key"), follower = submit("b", "key");
-  const auto run = greet(leader);
-  ASSERT_NE(run, nullptr);
-  ASSERT_TRUE(queue_->finish(leader->record().name).ok());
-  run->report_outcome({WorkOutcome::Kind::kSucceeded, "half a result", {}}, {});
-  EXPECT_TRUE(wait_for(leader, JobState::kSucceeded));
-  EXPECT_TRUE(wait_until([&] { return num_starts_of(follower) == 1; }));
-  EXPECT_NE(submit("c", "key")->record().state, JobState::kSucceeded);
-}
-
 TEST_F(JobQueueTest, TellsWhereAJobStandsInTheQueue) {
   const auto running = submit("a"), second = submit("b"), third = submit("c");
   ASSERT_TRUE(wait_for(running, JobState::kPreparing));
@@ -421,38 +225,6 @@ TEST_F(JobQueueTest, TellsWhereAJobStandsInTheQueue) {
   EXPECT_EQ(places[second->record().name].position, 1u);
   EXPECT_EQ(places[third->record().name].position, 2u);
   EXPECT_LT(places[second->record().name].expected_start_unix_ms, places[third->record().name].expected_start_unix_ms);
-}
-
-TEST_F(JobQueueTest, KeepsAnOutcomeUntilTheDiskTakesIt) {
-  const auto job = submit("a");
-  const auto run = greet(job);
-  ASSERT_NE(run, nullptr);
-  {
-    const DatabaseOutage outage;
-    run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
-    EXPECT_TRUE(wait_until([&] { return !queue_->disk_problem().empty(); }));
-    EXPECT_FALSE(queue_->submit({"b", "body", "label", "key", {}}).ok());
-    EXPECT_TRUE(store::is_running(job->record().state));
-    EXPECT_FALSE(link_->is_accepted);
-  }
-  EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
-  EXPECT_EQ(job->record().result, "result");
-  EXPECT_TRUE(wait_until([&] { return link_->is_accepted && queue_->disk_problem().empty(); }));
-}
-
-TEST_F(JobQueueTest, StartsNothingWhileTheDiskRefuses) {
-  const auto first = submit("a"), second = submit("b");
-  const auto run = greet(first);
-  ASSERT_NE(run, nullptr);
-  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
-  EXPECT_TRUE(wait_for(first, JobState::kSucceeded));
-  {
-    const DatabaseOutage outage;
-    run->accept();
-    EXPECT_TRUE(
-        wait_until([&] { return !queue_->disk_problem().empty() || store::is_running(second->record().state); }));
-  }
-  EXPECT_TRUE(wait_for(second, JobState::kPreparing));
 }
 
 TEST(TileSpool, GivesTilesBackInTheirOrder) {

@@ -3,24 +3,24 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 namespace radbake::jobs {
 namespace {
 
 using ::testing::ElementsAre;
-
-constexpr double kSeconds = 10;
 
 TEST(WaitingLine, KeepsTheOrderOfOneClient) {
   WaitingLine line;
   line.push({"second", "me", 0, 2});
   line.push({"third", "me", 0, 3});
   line.push({"first", "me", 0, 1});
-  EXPECT_THAT(line.order(kSeconds), ElementsAre("first", "second", "third"));
+  EXPECT_THAT(line.order(), ElementsAre("first", "second", "third"));
   EXPECT_TRUE(line.erase("second"));
   EXPECT_FALSE(line.erase("second"));
   EXPECT_EQ(line.size(), 2u);
-  EXPECT_EQ(line.pop(kSeconds).name, "first");
-  EXPECT_EQ(line.pop(kSeconds).name, "third");
+  EXPECT_EQ(line.pop().name, "first");
+  EXPECT_EQ(line.pop().name, "third");
   EXPECT_TRUE(line.is_empty());
 }
 
@@ -30,7 +30,7 @@ TEST(WaitingLine, PutsPriorityBeforeFairness) {
   line.push({"normal", "you", 0, 2});
   line.push({"high", "me", 5, 3});
   line.push({"high too", "me", 5, 4});
-  EXPECT_THAT(line.order(kSeconds), ElementsAre("high", "high too", "normal", "low"));
+  EXPECT_THAT(line.order(), ElementsAre("high", "high too", "normal", "low"));
 }
 
 TEST(WaitingLine, TakesTurnsBetweenClients) {
@@ -38,18 +38,18 @@ TEST(WaitingLine, TakesTurnsBetweenClients) {
   for (int i = 0; i < 4; ++i) line.push({"many " + std::to_string(i), "many", 0, i});
   line.push({"few 0", "few", 0, 10});
   line.push({"few 1", "few", 0, 11});
-  EXPECT_THAT(line.order(kSeconds), ElementsAre("many 0", "few 0", "many 1", "few 1", "many 2", "many 3"));
+  EXPECT_THAT(line.order(), ElementsAre("many 0", "few 0", "many 1", "few 1", "many 2", "many 3"));
 }
 
-TEST(WaitingLine, CountsSecondsNotJobs) {
+TEST(WaitingLine, CountsWhatBakesTookNotJobs) {
   WaitingLine line;
   for (int i = 0; i < 4; ++i) line.push({"short " + std::to_string(i), "short", 0, i});
   for (int i = 0; i < 3; ++i) line.push({"long " + std::to_string(i), "long", 0, 10 + i});
   std::vector<std::string> names;
   while (!line.is_empty()) {
-    const Waiting next = line.pop(kSeconds);
+    const Waiting next = line.pop();
     names.push_back(next.name);
-    line.settle(next.client, kSeconds, next.client == "long" ? 2.5 * kSeconds : kSeconds);
+    line.settle(next.client, next.client == "long" ? 2.5 : 1);
   }
   EXPECT_THAT(names, ElementsAre("short 0", "long 0", "short 1", "short 2", "long 1", "short 3", "long 2"));
 }
@@ -57,18 +57,34 @@ TEST(WaitingLine, CountsSecondsNotJobs) {
 TEST(WaitingLine, GivesNoCreditForRest) {
   WaitingLine line;
   for (int i = 0; i < 8; ++i) line.push({"busy " + std::to_string(i), "busy", 0, i});
-  for (int i = 0; i < 5; ++i) line.pop(kSeconds);
+  for (int i = 0; i < 5; ++i) line.pop();
   for (int i = 0; i < 3; ++i) line.push({"new " + std::to_string(i), "new", 0, 10 + i});
   // Level with the other, not five bakes ahead of it.
-  EXPECT_THAT(line.order(kSeconds), ElementsAre("new 0", "busy 5", "new 1", "busy 6", "new 2", "busy 7"));
+  EXPECT_THAT(line.order(), ElementsAre("new 0", "busy 5", "new 1", "busy 6", "new 2", "busy 7"));
 }
 
 TEST(WaitingLine, GoesOnWithTheTurnsOfAnEarlierServer) {
   WaitingLine line;
-  line.remember("served", 2 * kSeconds);
+  line.remember("served", 2);
   for (int i = 0; i < 3; ++i) line.push({"served " + std::to_string(i), "served", 0, i});
   for (int i = 0; i < 3; ++i) line.push({"other " + std::to_string(i), "other", 0, 10 + i});
-  EXPECT_THAT(line.order(kSeconds), ElementsAre("other 0", "other 1", "served 0", "other 2", "served 1", "served 2"));
+  EXPECT_THAT(line.order(), ElementsAre("other 0", "other 1", "served 0", "other 2", "served 1", "served 2"));
+}
+
+TEST(WaitingLine, TellsTheOrderInWhichItWillPop) {
+  std::mt19937 random(1);
+  for (int round = 0; round < 50; ++round) {
+    WaitingLine line;
+    for (int i = 0; i < 40; ++i) {
+      const std::string client(1, static_cast<char>('a' + random() % 6));
+      line.push({"job " + std::to_string(i), client, static_cast<int>(random() % 3), i});
+      if (random() % 4 == 0) line.settle(line.pop().client, 0.5 * static_cast<double>(random() % 5));
+    }
+    std::vector<std::string> popped;
+    const std::vector<std::string> order = line.order();
+    while (!line.is_empty()) popped.push_back(line.pop().name);
+    EXPECT_EQ(order, popped) << "round " << round;
+  }
 }
 
 }  // namespace

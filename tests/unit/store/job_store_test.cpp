@@ -37,8 +37,11 @@ class JobStoreTest : public ::testing::Test {
 
 TEST_F(JobStoreTest, KeepsEverythingOfAJobAcrossAStart) {
   const std::string name = create("a").name;
-  ASSERT_TRUE(store_->append_event(name, {JobState::kPreparing, 1, 0, "starts", "", {}}).ok());
-  ASSERT_TRUE(store_->append_event(name, {JobState::kSucceeded, 1, 0, "done", std::string("re\0sult", 7), {}}).ok());
+  ASSERT_TRUE(store_->append_event(name, {JobState::kPreparing, "starts"}).ok());
+  ASSERT_TRUE(
+      store_
+          ->append_event(name, {.state = JobState::kSucceeded, .message = "done", .result = std::string("re\0sult", 7)})
+          .ok());
   open();
   const auto job = store_->get(name);
   ASSERT_TRUE(job.ok());
@@ -67,9 +70,9 @@ TEST_F(JobStoreTest, KnowsARequestByItsIdAndBody) {
 
 TEST_F(JobStoreTest, NumbersEventsWithoutGapsAndReadsThemFromAnyOn) {
   const std::string name = create("a").name, other = create("b").name;
-  ASSERT_TRUE(store_->append_event(name, {JobState::kPreparing, 1, 0, "one", "", {}}).ok());
-  ASSERT_TRUE(store_->append_event(other, {JobState::kCancelled, 1, 0, "other", "", {}}).ok());
-  ASSERT_TRUE(store_->append_event(name, {JobState::kSolving, 1, 0, "two", "", {}}).ok());
+  ASSERT_TRUE(store_->append_event(name, {JobState::kPreparing, "one"}).ok());
+  ASSERT_TRUE(store_->append_event(other, {JobState::kCancelled, "other"}).ok());
+  ASSERT_TRUE(store_->append_event(name, {JobState::kSolving, "two"}).ok());
   const auto all = store_->events_after(name, 0);
   ASSERT_EQ(all->size(), 3u);
   for (std::size_t i = 0; i < all->size(); ++i) EXPECT_EQ((*all)[i].sequence, i + 1);
@@ -83,7 +86,7 @@ TEST_F(JobStoreTest, NumbersEventsWithoutGapsAndReadsThemFromAnyOn) {
 TEST_F(JobStoreTest, KeepsTheErrorOfAFailure) {
   const std::string name = create("a").name;
   const Error error{ErrorCode::kInvalidArgument, "mesh 'box' has no area"};
-  ASSERT_TRUE(store_->append_event(name, {JobState::kFailed, 1, 0, "failed", "", error}).ok());
+  ASSERT_TRUE(store_->append_event(name, {.state = JobState::kFailed, .message = "failed", .error = error}).ok());
   open();
   const auto job = store_->get(name);
   ASSERT_TRUE(job->error.has_value());
@@ -93,8 +96,8 @@ TEST_F(JobStoreTest, KeepsTheErrorOfAFailure) {
 
 TEST_F(JobStoreTest, FindsUnfinishedJobsOldestFirst) {
   const std::string a = create("a").name, b = create("b").name, c = create("c").name;
-  ASSERT_TRUE(store_->append_event(b, {JobState::kCancelled, 1, 0, "", "", {}}).ok());
-  ASSERT_TRUE(store_->append_event(c, {JobState::kGathering, 2, 1, "", "", {}}).ok());
+  ASSERT_TRUE(store_->append_event(b, {JobState::kCancelled}).ok());
+  ASSERT_TRUE(store_->append_event(c, {.state = JobState::kGathering, .attempt = 2, .lost_attempts = 1}).ok());
   open();
   const auto jobs = store_->unfinished();
   ASSERT_EQ(jobs->size(), 2u);
@@ -203,7 +206,7 @@ TEST_F(JobStoreTest, KnowsWhichBlobsAreNeeded) {
 
   EXPECT_EQ(*store_->forget_ended("", ends.created_unix_ms - 1000, 10), 0u);
   EXPECT_EQ(*store_->forget_ended("", ends.created_unix_ms + 1'000'000, 10), 1u);
-  ASSERT_TRUE(store_->drop_checkpoints(waits).ok());
+  ASSERT_TRUE(store_->drop_checkpoints(waits, {"rows"}).ok());
   EXPECT_EQ(*store_->needed_blobs(""), std::set<Digest>{input});
 }
 
@@ -228,6 +231,31 @@ TEST_F(JobStoreTest, KeepsCheckpointsForTheNextAttemptOfTheSameBake) {
   job.request_id = "c";
   job.owner.is_shared = false;
   EXPECT_TRUE(store_->checkpoints(*store_->create(job))->empty());
+}
+
+TEST_F(JobStoreTest, DropsCheckpointsWithTheLastUnfinishedJobOfABake) {
+  NewJob job{"a", "body", "label", "key", {}};
+  const JobRecord first = *store_->create(job);
+  job.request_id = "b";
+  const JobRecord equal = *store_->create(job);
+  job.request_id = "c";
+  job.owner.is_shared = false;
+  const JobRecord alone = *store_->create(job);
+  job.owner = {.tenant = "somebody else"};
+  const JobRecord others = *store_->create(job);
+  for (const JobRecord& each : {first, alone, others}) {
+    ASSERT_TRUE(store_->put_checkpoint(each, {"rows", digest_of(std::string("rows"))}).ok());
+  }
+  ASSERT_TRUE(store_->append_event(first.name, {JobState::kCancelled}).ok());
+  EXPECT_EQ(store_->checkpoints(equal)->size(), 1u);
+  ASSERT_TRUE(store_->append_event(equal.name, {JobState::kQueued}).ok());
+  EXPECT_EQ(store_->checkpoints(equal)->size(), 1u);
+  ASSERT_TRUE(store_->append_event(equal.name, {JobState::kFailed}).ok());
+  EXPECT_TRUE(store_->checkpoints(equal)->empty());
+  EXPECT_EQ(store_->checkpoints(alone)->size(), 1u);
+  ASSERT_TRUE(store_->append_event(alone.name, {JobState::kSucceeded}).ok());
+  EXPECT_TRUE(store_->checkpoints(alone)->empty());
+  EXPECT_EQ(store_->checkpoints(others)->size(), 1u);
 }
 
 TEST_F(JobStoreTest, BringsAFileOfTheFirstVersionUpToDate) {

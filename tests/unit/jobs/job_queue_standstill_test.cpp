@@ -1,0 +1,66 @@
+// What the disk and the system refuse.
+
+#include "tests/unit/jobs/job_queue_fixture.h"
+
+namespace radbake::jobs {
+namespace {
+
+TEST_F(JobQueueTest, KeepsAnOutcomeUntilTheDiskTakesIt) {
+  const auto job = submit("a");
+  const auto run = greet(job);
+  ASSERT_NE(run, nullptr);
+  {
+    const DatabaseOutage outage;
+    run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+    EXPECT_TRUE(wait_until([&] { return !queue_->standstill().empty(); }));
+    EXPECT_FALSE(queue_->submit({"b", "body", "label", "key", {}}).ok());
+    EXPECT_TRUE(store::is_running(job->record().state));
+    EXPECT_FALSE(link_->is_accepted);
+  }
+  EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
+  EXPECT_EQ(job->record().result, "result");
+  EXPECT_TRUE(wait_until([&] { return link_->is_accepted && queue_->standstill().empty(); }));
+}
+
+TEST_F(JobQueueTest, StartsNothingWhileTheDiskRefuses) {
+  const auto first = submit("a"), second = submit("b");
+  const auto run = greet(first);
+  ASSERT_NE(run, nullptr);
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  EXPECT_TRUE(wait_for(first, JobState::kSucceeded));
+  {
+    const DatabaseOutage outage;
+    run->accept();
+    EXPECT_TRUE(wait_until([&] { return !queue_->standstill().empty() || store::is_running(second->record().state); }));
+  }
+  EXPECT_TRUE(wait_for(second, JobState::kPreparing));
+}
+
+TEST_F(JobQueueTest, RefusesACancelThatCannotBeRecorded) {
+  const auto job = submit("a");
+  const auto run = greet(job);
+  ASSERT_NE(run, nullptr);
+  const DatabaseOutage outage;
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  EXPECT_TRUE(wait_until([&] { return !queue_->standstill().empty(); }));
+  const auto cancelled = queue_->cancel(job->record().name);
+  ASSERT_FALSE(cancelled.ok());
+  EXPECT_EQ(cancelled.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(cancelled.error().message, HasSubstr("cannot be recorded yet"));
+}
+
+TEST_F(JobQueueTest, KeepsJobsUntilAWorkerCanBeStarted) {
+  std::filesystem::remove(options_.worker.program);
+  const auto first = submit("a"), second = submit("b");
+  EXPECT_TRUE(wait_until([&] { return !queue_->standstill().empty(); }));
+  EXPECT_THAT(queue_->standstill(), HasSubstr("cannot start the worker " + options_.worker.program.string()));
+  EXPECT_TRUE(wait_for(first, JobState::kQueued));
+  write_worker("sleep 1000");
+  EXPECT_TRUE(wait_for(first, JobState::kPreparing));
+  EXPECT_EQ(first->record().failed_attempts, 0u);
+  EXPECT_EQ(second->record().state, JobState::kQueued);
+  EXPECT_TRUE(queue_->standstill().empty());
+}
+
+}  // namespace
+}  // namespace radbake::jobs

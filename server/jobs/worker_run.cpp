@@ -159,7 +159,7 @@ Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
 Result<void> WorkerRun::refuse_chunk(const Error& problem) {
   // Bytes that are not what their digest says are the worker's fault.
   if (problem.code == ErrorCode::kDataLoss) return problem;
-  kill("could not be heard: " + problem.message, Blame::kServer);
+  kill("sent what cannot be kept (" + problem.message + ")", Blame::kServer);
   return {};
 }
 

@@ -10,17 +10,17 @@
 namespace radbake::store {
 
 Result<std::unique_ptr<BlobWriter>> BlobWriter::create(const std::filesystem::path& temporary) {
-  RADBAKE_ASSIGN_OR_RETURN(FileDescriptor file, open_file(temporary, O_WRONLY | O_CREAT | O_EXCL));
+  RADBAKE_ASSIGN_OR_RETURN(FileDescriptor file, open_file(temporary, O_WRONLY | O_CREAT | O_EXCL, kName));
   return std::unique_ptr<BlobWriter>(new BlobWriter(temporary, std::move(file)));
 }
 
 Result<std::unique_ptr<BlobWriter>> BlobWriter::resume(const std::filesystem::path& temporary) {
-  RADBAKE_ASSIGN_OR_RETURN(FileDescriptor file, open_file(temporary, O_RDWR | O_CREAT));
+  RADBAKE_ASSIGN_OR_RETURN(FileDescriptor file, open_file(temporary, O_RDWR | O_CREAT, kName));
   std::unique_ptr<BlobWriter> writer(new BlobWriter(temporary, std::move(file)));
   constexpr std::uint64_t kPieceBytes = 1 << 20;
   while (true) {
     RADBAKE_ASSIGN_OR_RETURN(const std::string piece,
-                             read_range(writer->file_.get(), writer->size_, kPieceBytes, temporary.string()));
+                             read_range(writer->file_.get(), writer->size_, kPieceBytes, kName));
     if (piece.empty()) return writer;
     writer->hash_.update(std::as_bytes(std::span(piece)));
     writer->size_ += piece.size();
@@ -35,7 +35,7 @@ BlobWriter::~BlobWriter() {
 }
 
 Result<void> BlobWriter::append(std::span<const std::byte> bytes) {
-  RADBAKE_RETURN_IF_ERROR(write_all(file_.get(), bytes, size_, temporary_.string()));
+  RADBAKE_RETURN_IF_ERROR(write_all(file_.get(), bytes, size_, kName));
   hash_.update(bytes);
   size_ += bytes.size();
   return {};
@@ -55,7 +55,7 @@ Result<void> BlobWriter::publish(const Digest& expected, const std::filesystem::
   failpoint("blob.written");
   RADBAKE_RETURN_IF_ERROR(force());
   failpoint("blob.synced");
-  if (std::rename(temporary_.c_str(), name.c_str()) != 0) return system_error("cannot create " + name.string());
+  if (std::rename(temporary_.c_str(), name.c_str()) != 0) return system_error("cannot name " + std::string(kName));
   is_kept_ = true;
   return {};
 }

@@ -27,12 +27,13 @@ class BlobWriter {
   /// Appends bytes. After an error the writer is of no more use.
   Result<void> append(std::span<const std::byte> bytes);
   /// Forces what was written to the disk.
-  Result<void> force() { return sync(file_.get(), temporary_.string()); }
+  Result<void> force() { return sync(file_.get(), kName); }
   /// Leaves the file where it is, for resume().
   void keep() { is_kept_ = true; }
 
  private:
   friend class ContentStore;
+  static constexpr const char* kName = "a blob in the content store";  ///< in errors
   BlobWriter(std::filesystem::path temporary, FileDescriptor file);
 
   /// Checks size and digest, forces the bytes to the disk and gives them their name. The caller syncs the folder.

@@ -16,6 +16,7 @@ namespace {
 using std::chrono::system_clock;
 
 const char* const kUploadPrefix = "upload-";
+const char* const kShelves = "the content store";  // in errors
 
 /// Blobs' times are not set anew more often than this.
 constexpr std::chrono::minutes kTouchInterval{5};
@@ -253,8 +254,8 @@ Result<void> ContentStore::commit(BlobWriter& blob, const Digest& expected) {
   const std::filesystem::path name = path_of(expected);
   const std::filesystem::path shelf = name.parent_path();
   if (!std::filesystem::exists(shelf)) {
-    RADBAKE_RETURN_IF_ERROR(make_folders(shelf));
-    RADBAKE_RETURN_IF_ERROR(sync_folder(folder_ / "objects"));
+    RADBAKE_RETURN_IF_ERROR(make_folders(shelf, kShelves));
+    RADBAKE_RETURN_IF_ERROR(sync_folder(folder_ / "objects", kShelves));
   }
   {
     const std::shared_lock lock(sweeping_);
@@ -265,7 +266,7 @@ Result<void> ContentStore::commit(BlobWriter& blob, const Digest& expected) {
   }
   failpoint("content.renamed");
   // Without this the name itself may vanish in a power loss.
-  RADBAKE_RETURN_IF_ERROR(sync_folder(shelf));
+  RADBAKE_RETURN_IF_ERROR(sync_folder(shelf, kShelves));
   failpoint("content.folder_synced");
   return {};
 }
@@ -275,7 +276,7 @@ Result<FileDescriptor> ContentStore::open_blob(const Digest& digest) const {
     return Error{ErrorCode::kNotFound, "there is no blob " + digest.sha256.substr(0, 80) + " of " +
                                            std::to_string(digest.size_bytes) + " bytes"};
   }
-  return open_file(path_of(digest), O_RDONLY);
+  return open_file(path_of(digest), O_RDONLY, "blob " + digest.sha256);
 }
 
 Result<std::string> ContentStore::read_blob(const Digest& digest) const {

@@ -26,8 +26,12 @@ Error error_of(const std::string& what, const std::error_code& reason) {
 Error system_error(const std::string& what) { return error_of(what, {errno, std::system_category()}); }
 
 Result<FileDescriptor> open_file(const std::filesystem::path& path, int flags) {
+  return open_file(path, flags, path.string());
+}
+
+Result<FileDescriptor> open_file(const std::filesystem::path& path, int flags, const std::string& name) {
   FileDescriptor file(::open(path.c_str(), flags | O_CLOEXEC, 0600));
-  if (!file.is_open()) return system_error("cannot open " + path.string());
+  if (!file.is_open()) return system_error("cannot open " + name);
   return file;
 }
 
@@ -62,15 +66,15 @@ Result<void> sync(int fd, const std::string& name) {
   return {};
 }
 
-Result<void> sync_folder(const std::filesystem::path& folder) {
-  RADBAKE_ASSIGN_OR_RETURN(const FileDescriptor file, open_file(folder, O_RDONLY | O_DIRECTORY));
-  return sync(file.get(), folder.string());
+Result<void> sync_folder(const std::filesystem::path& folder, const std::string& name) {
+  RADBAKE_ASSIGN_OR_RETURN(const FileDescriptor file, open_file(folder, O_RDONLY | O_DIRECTORY, name));
+  return sync(file.get(), name);
 }
 
-Result<void> make_folders(const std::filesystem::path& folder) {
+Result<void> make_folders(const std::filesystem::path& folder, const std::string& name) {
   std::error_code reason;
   std::filesystem::create_directories(folder, reason);
-  if (reason) return error_of("cannot create the folder " + folder.string(), reason);
+  if (reason) return error_of("cannot create the folder of " + name, reason);
   return {};
 }
 

@@ -41,11 +41,16 @@ class FileDescriptor {
 };
 
 /// The error of the system call that just failed, as "what: reason". A full disk is kResourceExhausted, a missing file
-/// kNotFound, all else kInternal.
+/// kNotFound, want of descriptors or memory kUnavailable, all else kInternal.
 Error system_error(const std::string& what);
 
 /// Opens a file, never inherited by child processes unless asked for.
 Result<FileDescriptor> open_file(const std::filesystem::path& path, int flags);
+
+// Errors name a file as `name` says: clients read them, too, and need not know where the server keeps what.
+
+/// The same for a file that errors are to name so.
+Result<FileDescriptor> open_file(const std::filesystem::path& path, int flags, const std::string& name);
 
 /// Writes all bytes at an offset.
 Result<void> write_all(int fd, std::span<const std::byte> bytes, std::uint64_t offset, const std::string& name);
@@ -55,9 +60,10 @@ Result<std::string> read_range(int fd, std::uint64_t offset, std::uint64_t limit
 
 /// Forces a file or a folder to the disk. After an error nobody knows what arrived: give the file up, never try again.
 Result<void> sync(int fd, const std::string& name);
-Result<void> sync_folder(const std::filesystem::path& folder);
+Result<void> sync_folder(const std::filesystem::path& folder, const std::string& name);
 
 /// Creates a folder and its parents where missing.
-Result<void> make_folders(const std::filesystem::path& folder);
+Result<void> make_folders(const std::filesystem::path& folder, const std::string& name);
+inline Result<void> make_folders(const std::filesystem::path& folder) { return make_folders(folder, folder.string()); }
 
 }  // namespace radbake::store

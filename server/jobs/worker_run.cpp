@@ -109,29 +109,24 @@ Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLi
   return {};
 }
 
+bool WorkerRun::hear() {
+  const std::lock_guard lock(mutex_);
+  last_heard_at_ = Clock::now();
+  return kill_reason_.empty() && !has_outcome_;
+}
+
 void WorkerRun::report_progress(const JobProgress& progress) {
-  {
-    const std::lock_guard lock(mutex_);
-    last_heard_at_ = Clock::now();
-    if (has_outcome_) return;
-  }
+  if (!hear()) return;
   events_.on_progress(progress);
 }
 
 void WorkerRun::report_tile(const std::string& tile) {
-  {
-    const std::lock_guard lock(mutex_);
-    last_heard_at_ = Clock::now();
-    if (has_outcome_) return;
-  }
+  if (!hear()) return;
   events_.on_tile(tile);
 }
 
 Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
-  {
-    const std::lock_guard lock(mutex_);
-    last_heard_at_ = Clock::now();
-  }
+  if (!hear()) return {};
   if (!blob_.writer) {
     auto writer = content_.new_blob();
     if (!writer.ok()) return refuse_chunk(writer.error());
@@ -150,9 +145,7 @@ Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
   blob_.writer.reset();
   if (!committed.ok()) return refuse_chunk(committed.error());
   if (chunk.is_checkpoint) events_.on_checkpoint({chunk.blob, *chunk.digest});
-  // Forcing a large blob to the disk takes a while in which the worker was not heard.
-  const std::lock_guard lock(mutex_);
-  last_heard_at_ = Clock::now();
+  hear();  // forcing a large blob to the disk takes a while
   return {};
 }
 
@@ -164,19 +157,14 @@ Result<void> WorkerRun::refuse_chunk(const Error& problem) {
 }
 
 void WorkerRun::report_dropped_checkpoints(const std::vector<std::string>& names) {
-  {
-    const std::lock_guard lock(mutex_);
-    last_heard_at_ = Clock::now();
-    if (has_outcome_) return;
-  }
+  if (!hear()) return;
   events_.on_drop_checkpoints(names);
 }
 
 void WorkerRun::report_outcome(WorkOutcome outcome, const std::vector<Digest>& blobs) {
   {
     const std::lock_guard lock(mutex_);
-    last_heard_at_ = Clock::now();
-    if (std::exchange(has_outcome_, true)) return;
+    if (!kill_reason_.empty() || std::exchange(has_outcome_, true)) return;
   }
   const std::vector<Digest> missing = content_.find_missing(blobs);
   if (!missing.empty()) {

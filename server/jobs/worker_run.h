@@ -68,7 +68,8 @@ class WorkerRun {
   /// be opened.
   Result<void> start(WorkerGate& gate, std::unique_ptr<ReadyWorker> ready = nullptr);
 
-  // What the worker reports.
+  // What the worker reports. Nothing happens after its outcome, or once it was killed: what it had sent by then may
+  // build on what could not be kept.
   /// Checks that this is the worker that was started for this attempt, and gives it its work.
   Result<void> greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link);
   void report_progress(const JobProgress& progress);
@@ -107,6 +108,8 @@ class WorkerRun {
     std::string reason;
     Blame blame = Blame::kWorker;
   };
+  /// Notes a sign of life. False: what it says does not count any more; it was killed, or has said how it ended.
+  bool hear();
   std::optional<Fault> overstepped_limit(Clock::time_point now) const;
   /// Ends the attempt where the disk, not the worker, is to blame.
   Result<void> refuse_chunk(const Error& problem);

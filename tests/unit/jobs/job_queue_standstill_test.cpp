@@ -62,5 +62,23 @@ TEST_F(JobQueueTest, KeepsJobsUntilAWorkerCanBeStarted) {
   EXPECT_TRUE(queue_->standstill().empty());
 }
 
+TEST_F(JobQueueTest, BlamesNoWorkerForWhatItSendsAfterTheDiskRefused) {
+  const auto job = submit("a");
+  const auto run = greet(job);
+  ASSERT_NE(run, nullptr);
+  const std::string texels = "texels";
+  {
+    const DatabaseOutage outage;
+    // It has sent all of these before it is told.
+    for (const char* name : {"lightmap_0", "lightmap_1"}) {
+      EXPECT_TRUE(run->report_chunk({name, 0, texels, digest_of(texels)}).ok());
+    }
+    run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {digest_of(texels)});
+    EXPECT_TRUE(wait_until([&] { return !queue_->standstill().empty(); }));
+  }
+  EXPECT_TRUE(wait_until([&] { return num_starts_of(job) == 2; }));
+  EXPECT_EQ(job->record().failed_attempts, 0u);
+}
+
 }  // namespace
 }  // namespace radbake::jobs

@@ -26,8 +26,11 @@ void Housekeeping::keep_house(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     woken.wait_for(lock, stop, options_.interval, [] { return false; });
     const auto resting_since = std::chrono::steady_clock::now() - options_.upload_rest;
-    content_.for_each(
-        [&](const std::string&, store::ContentStore& store) { store.close_resting_uploads(resting_since); });
+    const std::uint64_t lacking = options_.lacking_bytes ? options_.lacking_bytes() : 0;
+    content_.for_each([&](const std::string& tenant, store::ContentStore& store) {
+      store.close_resting_uploads(resting_since);
+      if (lacking > 0) make_room(tenant, store, lacking);
+    });
   }
 }
 
@@ -40,7 +43,9 @@ void Housekeeping::make_room(const std::string& tenant, store::ContentStore& con
   while (true) {
     const auto needed = jobs_.needed_blobs(tenant);
     if (!needed.ok()) return spdlog::error("no room is made: {}", needed.error().message);
-    freed += content.sweep(*needed, now - options_.blob_grace, bytes - freed);
+    const auto swept = content.sweep(*needed, now - options_.blob_grace, bytes - freed);
+    if (!swept.ok()) return spdlog::error("no room is made: {}", swept.error().message);
+    freed += *swept;
     if (freed >= bytes) break;
     const auto num_forgotten = jobs_.forget_ended(tenant, forgotten_before, kForgottenAtOnce);
     if (!num_forgotten.ok()) return spdlog::error("no room is made: {}", num_forgotten.error().message);

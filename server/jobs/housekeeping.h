@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <thread>
 
@@ -15,14 +16,15 @@ struct HousekeepingOptions {
   std::chrono::seconds blob_grace{3600};     ///< what somebody asked for is kept this long, needed or not
   std::chrono::seconds upload_rest{60};      ///< an upload that rests this long gives its open file back
   std::chrono::hours keep_results{30 * 24};  ///< bakes that ended are forgotten after this, where room is needed
+  std::function<std::uint64_t()> lacking_bytes = {};  ///< what the disk lacks at present; null: nothing
 };
 
 /// Makes room: a mark and sweep over what jobs need and what is stored.
 ///
 /// Needed are the inputs of jobs that have not ended, results, and checkpoints. Other blobs are kept until an upload
-/// lacks room, then the ones unused the longest go first, but none within its grace: who has just asked for a blob may
-/// be about to submit a bake of it. Where that is not enough, bakes that ended long ago are forgotten with their
-/// results, oldest first.
+/// lacks room, or the disk does, then the ones unused the longest go first, but none within its grace: who has just
+/// asked for a blob may be about to submit a bake of it. Where that is not enough, bakes that ended long ago are
+/// forgotten with their results, oldest first.
 class Housekeeping {
  public:
   Housekeeping(const HousekeepingOptions& options, store::JobStore& jobs, store::TenantContent& content);

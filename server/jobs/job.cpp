@@ -5,7 +5,12 @@
 namespace radbake::jobs {
 
 Job::Job(store::JobRecord record, std::vector<store::JobEvent> events)
-    : record_(std::move(record)), events_(std::move(events)) {}
+    : name_(record.name), record_(std::move(record)), events_(std::move(events)) {}
+
+store::JobState Job::state() const {
+  const std::lock_guard lock(mutex_);
+  return record_.state;
+}
 
 store::JobRecord Job::record() const {
   const std::lock_guard lock(mutex_);

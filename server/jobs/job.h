@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/jobs/job_progress.h"
@@ -20,6 +21,9 @@ class Job {
  public:
   Job(store::JobRecord record, std::vector<store::JobEvent> events);
 
+  const std::string& name() const { return name_; }
+  store::JobState state() const;
+  /// A copy, with all inputs.
   store::JobRecord record() const;
   std::vector<store::JobEvent> events_after(std::uint64_t sequence) const;
   /// When it came into its present state; 0 for a job without events.
@@ -59,6 +63,7 @@ class Job {
  private:
   void wake_watchers();
 
+  const std::string name_;
   mutable std::mutex mutex_;  // guards what follows
   store::JobRecord record_;
   std::vector<store::JobEvent> events_;

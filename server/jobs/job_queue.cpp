@@ -52,7 +52,7 @@ Result<void> JobQueue::recover() {
   constexpr std::int64_t kLatelyMs = 3600 * 1000;
   RADBAKE_ASSIGN_OR_RETURN(const auto counts, store_.ended_by_client(unix_ms_now() - kLatelyMs));
   for (const auto& count : counts) {
-    waiting_.remember(scoped(count.tenant, count.client), static_cast<double>(count.num_ended));
+    waiting_.remember(count.tenant, count.client, static_cast<double>(count.num_ended));
   }
   RADBAKE_ASSIGN_OR_RETURN(const std::vector<JobRecord> records, store_.unfinished());
   for (const JobRecord& record : records) {
@@ -196,19 +196,21 @@ std::map<std::string, QueuePlace> JobQueue::places() {
   return thread_.run([this] {
     std::map<std::string, QueuePlace> places;
     // Each slot is free when its bake may end.
+    constexpr double kFirstGuessSeconds = 10;
+    const double usual_seconds = usual_seconds_.value_or(kFirstGuessSeconds);
     const std::int64_t now = unix_ms_now();
     std::multiset<double> free_in;
     for (const auto& [name, job] : live_) {
       if (!runs_.contains(name)) continue;
       const double left = job->progress().progress.seconds_left;
-      free_in.insert(left >= 0 ? left : usual_seconds_);
+      free_in.insert(left >= 0 ? left : usual_seconds);
     }
     while (free_in.size() < options_.max_running) free_in.insert(0);
     std::uint32_t position = 0;
     for (const std::string& name : waiting_.order()) {
       const double starts_in = *free_in.begin();
       free_in.erase(free_in.begin());
-      free_in.insert(starts_in + usual_seconds_);
+      free_in.insert(starts_in + usual_seconds);
       places[name] = {++position, now + static_cast<std::int64_t>(1000 * starts_in), ""};
     }
     for (const auto& [follower, leader] : leaders_) {

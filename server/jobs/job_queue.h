@@ -39,6 +39,7 @@ struct QueueOptions {
   std::uint32_t max_lost_attempts = 5;    ///< a bake that takes the server down this often, without getting on, fails
   std::uint32_t max_failed_attempts = 3;  ///< and one whose worker dies this often
   std::chrono::milliseconds plan_limit{60'000};
+  std::chrono::milliseconds bake_limit{0};         ///< of an attempt; a bake that takes longer fails; 0: none
   std::chrono::milliseconds check_interval{100};   ///< how often workers are held against their limits
   std::chrono::milliseconds retry_interval{1000};  ///< how often what stands in the way is tried again
   JobObserver* observer = nullptr;                 ///< may be null; outlives the queue
@@ -58,7 +59,7 @@ struct QueueStats {
   std::uint64_t num_plans = 0;  ///< that are being made
 };
 
-/// Accepts jobs, runs them one after the other in workers, and keeps the record of what became of them.
+/// Accepts jobs, runs them in workers, some at the same time, and keeps the record of what became of them.
 ///
 ///   queued -> preparing -> form factors -> solving -> gathering -> writing -> succeeded | failed | cancelled
 ///
@@ -147,13 +148,14 @@ class JobQueue {
   /// Makes what an attempt needs and records that it begins. Errors: the disk refuses, and nothing has changed.
   Result<std::shared_ptr<WorkerRun>> begin_attempt(const std::shared_ptr<Job>& job);
   /// What every run tells at its end.
-  RunEvents ends_of(const std::string& name);
+  RunEvents ends_of(const std::string& name, std::uint32_t attempt);
   RunEvents events_of(const std::shared_ptr<Job>& job, const std::shared_ptr<TileSpool>& spool);
   Result<std::string> start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done);
   void advance(const std::string& name, store::JobState state);
-  void end_work(const std::string& name, WorkOutcome outcome);
+  void end_work(const std::string& name, std::uint32_t attempt, WorkOutcome outcome);
   void end_run(const std::string& name, const WorkerExit& exit);
   AttemptEnd attempt_end_of(const WorkerRun& run) const;
+  void end_turn(const WorkerRun& run, const WorkerExit& exit);
   void end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run, const std::string& reason);
   void queue_again(const std::shared_ptr<Job>& job, const std::string& why, bool has_failed);
   void finish_plan(const std::string& name, Result<std::string> plan);
@@ -164,7 +166,8 @@ class JobQueue {
   void end_job(const std::shared_ptr<Job>& job, store::StateChange end);
   void fail(const std::shared_ptr<Job>& job, Error error);
   void keep_checkpoint(const std::string& name, std::uint32_t attempt, const store::CheckpointRecord& checkpoint);
-  void drop_checkpoints(const std::string& name, const std::vector<std::string>& names);
+  void drop_checkpoints(const std::string& name, std::uint32_t attempt, const std::vector<std::string>& names);
+  void remove_blobs(const std::string& tenant, const std::vector<Digest>& blobs);
   /// Starts nothing until try_again() finds that all is well.
   void stand_still(const Error& problem);
   void try_again();
@@ -208,16 +211,15 @@ class JobQueue {
   std::map<std::string, std::string> leaders_;  // [followers]
   std::deque<Unsaved> unsaved_;
   std::map<std::string, std::vector<std::shared_ptr<Job>>> sharers_;  // [shared key] live jobs, oldest first
-  std::map<std::string, std::string> turns_;                          // [running] whose turn it is
-  double usual_seconds_ = kFirstGuessSeconds;                         // of a bake, lately
+  std::map<std::string, Waiting> turns_;                              // [running] whose turn it is
+  std::optional<double> usual_seconds_;                               // of a bake, lately
   std::set<std::string> to_finish_;                                   // of the jobs that have not ended
   std::map<std::string, PlanDone> plans_;
   std::unique_ptr<ReadyWorker> ready_;  // null: none, or given to a run
   std::uint32_t num_running_ = 0;
   std::uint64_t next_plan_ = 1;
 
-  static constexpr double kFirstGuessSeconds = 10;
-  /// A client's name or a bake key, of one tenant's: no tenant's name has a line's end.
+  /// A bake key of one tenant's: no tenant's name has a line's end.
   static std::string scoped(const std::string& tenant, const std::string& name) { return tenant + '\n' + name; }
 
   std::jthread watchdog_;

@@ -16,14 +16,14 @@ using store::JobState;
 using store::StateChange;
 
 void JobQueue::line_up(const JobRecord& job) {
-  waiting_.push({job.name, scoped(job.owner.tenant, job.owner.client), job.owner.priority, job.id});
+  waiting_.push({job.name, job.owner.tenant, job.owner.client, job.owner.priority, job.id});
 }
 
 void JobQueue::run_waiting_jobs() {
   while (!is_refusing_ && !is_draining_ && standstill_.empty() && !waiting_.is_empty() &&
          num_running_ < options_.max_running) {
     const Waiting next = waiting_.pop();
-    turns_[next.name] = next.client;
+    turns_[next.name] = next;
     if (const auto job = find_live(next.name)) start_job(job);
   }
 }
@@ -36,10 +36,10 @@ void JobQueue::add_run(const std::shared_ptr<WorkerRun>& run) {
   runs_changed_.notify_all();
 }
 
-RunEvents JobQueue::ends_of(const std::string& name) {
+RunEvents JobQueue::ends_of(const std::string& name, std::uint32_t attempt) {
   RunEvents events;
-  events.on_outcome = [this, name](WorkOutcome outcome) {
-    thread_.post([this, name, outcome = std::move(outcome)] { end_work(name, outcome); });
+  events.on_outcome = [this, name, attempt](WorkOutcome outcome) {
+    thread_.post([this, name, attempt, outcome = std::move(outcome)] { end_work(name, attempt, outcome); });
   };
   events.on_exit = [this, name](const WorkerExit& exit) { thread_.post([this, name, exit] { end_run(name, exit); }); };
   return events;
@@ -48,7 +48,8 @@ RunEvents JobQueue::ends_of(const std::string& name) {
 RunEvents JobQueue::events_of(const std::shared_ptr<Job>& job, const std::shared_ptr<TileSpool>& spool) {
   const JobRecord record = job->record();
   const std::string& name = record.name;
-  RunEvents events = ends_of(name);
+  const std::uint32_t attempt = record.attempt;
+  RunEvents events = ends_of(name, attempt);
   events.on_progress = [this, job, name, last = JobState::kPreparing](const JobProgress& progress) mutable {
     if (!is_running(progress.state)) return;
     if (std::exchange(last, progress.state) != progress.state) {
@@ -65,11 +66,11 @@ RunEvents JobQueue::events_of(const std::shared_ptr<Job>& job, const std::shared
     }
     job->tile_arrived();
   };
-  events.on_checkpoint = [this, name, attempt = record.attempt](const store::CheckpointRecord& checkpoint) {
+  events.on_checkpoint = [this, name, attempt](const store::CheckpointRecord& checkpoint) {
     thread_.post([this, name, attempt, checkpoint] { keep_checkpoint(name, attempt, checkpoint); });
   };
-  events.on_drop_checkpoints = [this, name](const std::vector<std::string>& names) {
-    thread_.post([this, name, names] { drop_checkpoints(name, names); });
+  events.on_drop_checkpoints = [this, name, attempt](const std::vector<std::string>& names) {
+    thread_.post([this, name, attempt, names] { drop_checkpoints(name, attempt, names); });
   };
   return events;
 }
@@ -84,9 +85,11 @@ Result<std::shared_ptr<WorkerRun>> JobQueue::begin_attempt(const std::shared_ptr
   RADBAKE_RETURN_IF_ERROR(
       change(job, {.state = JobState::kPreparing, .message = "attempt " + std::to_string(record.attempt) + " starts"}));
   job->set_tiles(spool);
+  const auto limit = options_.bake_limit.count() > 0 ? std::optional(options_.bake_limit) : std::nullopt;
   return std::make_shared<WorkerRun>(WorkerRun::Assignment{.job = record.name,
                                                            .attempt = record.attempt,
                                                            .work = record.work,
+                                                           .time_limit = limit,
                                                            .accepted_unix_ms = record.created_unix_ms,
                                                            .trace_id = record.owner.trace_id,
                                                            .checkpoints = std::move(checkpoints)},
@@ -143,6 +146,7 @@ Result<void> JobQueue::change_one(const std::shared_ptr<Job>& job, const StateCh
   spdlog::info("{} {} (attempt {}): {}", name, job_state_name(record.state), record.attempt,
                record.error ? record.error->message : change.message);
   const bool has_ended = is_terminal(record.state);
+  remove_blobs(record.owner.tenant, recorded.unneeded);
   job->set_record(std::move(recorded.record), std::move(recorded.event));
   if (has_ended) {
     to_finish_.erase(name);
@@ -166,8 +170,10 @@ Result<void> JobQueue::change(const std::shared_ptr<Job>& job, StateChange chang
   }
   for (const auto& follower : job->followers()) {
     if (is_terminal(change.state)) leave_leader(follower);
-    if (auto changed = change_one(follower, change); changed.ok() || !is_terminal(change.state)) continue;
-    unsaved_.push_back({follower, change});
+    if (auto changed = change_one(follower, change); !changed.ok() && is_terminal(change.state)) {
+      stand_still(changed.error());
+      unsaved_.push_back({follower, change});
+    }
   }
   return {};
 }
@@ -176,7 +182,7 @@ void JobQueue::end_job(const std::shared_ptr<Job>& job, StateChange end) {
   if (auto changed = change(job, end); !changed.ok()) {
     stand_still(changed.error());
     unsaved_.push_back({job, std::move(end)});
-  } else if (const auto run = find_run(job->record().name)) {
+  } else if (const auto run = find_run(job->name())) {
     run->accept();
   }
 }
@@ -222,7 +228,7 @@ void JobQueue::try_again() {
     unsaved_.pop_front();
     if (!is_terminal(end.state)) {
       line_up(job->record());
-    } else if (const auto run = find_run(job->record().name)) {
+    } else if (const auto run = find_run(job->name())) {
       run->accept();
     }
   }
@@ -244,24 +250,40 @@ void JobQueue::keep_checkpoint(const std::string& name, std::uint32_t attempt,
   const auto job = find_live(name);
   if (!job || job->record().attempt != attempt) return;
   // Without it the bake itself goes on.
-  if (auto kept = store_.put_checkpoint(job->record(), checkpoint); !kept.ok()) {
-    spdlog::warn("{}: checkpoint '{}' is not kept: {}", name, checkpoint.name, kept.error().message);
+  const JobRecord record = job->record();
+  auto replaced = store_.put_checkpoint(record, checkpoint);
+  if (!replaced.ok()) {
+    spdlog::warn("{}: checkpoint '{}' is not kept: {}", name, checkpoint.name, replaced.error().message);
     return;
   }
+  remove_blobs(record.owner.tenant, *replaced);
   store::failpoint("checkpoint.kept");
   job->forget_lost_attempts();
 }
 
-void JobQueue::drop_checkpoints(const std::string& name, const std::vector<std::string>& names) {
+void JobQueue::drop_checkpoints(const std::string& name, std::uint32_t attempt, const std::vector<std::string>& names) {
   const auto job = find_live(name);
   if (!job) return;
-  if (auto dropped = store_.drop_checkpoints(job->record(), names); !dropped.ok()) {
+  const JobRecord record = job->record();
+  if (record.attempt != attempt) return;
+  if (auto dropped = store_.drop_checkpoints(record, names); !dropped.ok()) {
     spdlog::warn("{}: old checkpoints stay: {}", name, dropped.error().message);
+  } else {
+    remove_blobs(record.owner.tenant, *dropped);
   }
 }
 
-void JobQueue::end_work(const std::string& name, WorkOutcome outcome) {
+void JobQueue::remove_blobs(const std::string& tenant, const std::vector<Digest>& blobs) {
+  if (blobs.empty()) return;
+  if (auto content = content_.of(tenant); content.ok()) {
+    for (const Digest& blob : blobs) (*content)->remove(blob);
+  }
+}
+
+void JobQueue::end_work(const std::string& name, std::uint32_t attempt, WorkOutcome outcome) {
   const auto run = find_run(name);
+  // Late words of an attempt that was given up.
+  if (!run || run->assignment().attempt != attempt) return;
   using Kind = WorkOutcome::Kind;
   if (plans_.contains(name)) {
     switch (outcome.kind) {
@@ -269,7 +291,7 @@ void JobQueue::end_work(const std::string& name, WorkOutcome outcome) {
       case Kind::kFailed: finish_plan(name, std::move(outcome.error)); break;
       case Kind::kCancelled: finish_plan(name, Error{ErrorCode::kCancelled, "cancelled"}); break;
     }
-    if (run) run->accept();
+    run->accept();
     return;
   }
   const auto job = find_live(name);
@@ -282,7 +304,7 @@ void JobQueue::end_work(const std::string& name, WorkOutcome outcome) {
                   .result = std::move(outcome.result),
                   .outputs = std::move(outcome.outputs),
                   .is_whole = !to_finish_.contains(name)});
-  } else if (run && run->is_cancel_requested()) {
+  } else if (run->is_cancel_requested()) {
     end_job(job, {.state = JobState::kCancelled});
   } else {
     fail(job, internal_error("the worker stopped without being asked to"));
@@ -303,14 +325,7 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   } else {
     --num_running_;
     if (options_.observer != nullptr) options_.observer->attempt_ended(attempt_end_of(*run));
-    constexpr double kLeastSeconds = 1e-3;
-    const double seconds = run->seconds();
-    if (const auto turn = turns_.extract(name)) {
-      waiting_.settle(turn.mapped(), seconds / std::max(usual_seconds_, kLeastSeconds));
-    }
-    constexpr double kNewest = 0.3;
-    usual_seconds_ =
-        usual_seconds_ == kFirstGuessSeconds ? seconds : usual_seconds_ + kNewest * (seconds - usual_seconds_);
+    end_turn(*run, exit);
   }
   // Whoever still lives here got no outcome from its worker.
   if (const auto job = find_live(name); job && !is_unsaved(job)) end_job_run(job, *run, reason);
@@ -321,6 +336,18 @@ void JobQueue::end_run(const std::string& name, const WorkerExit& exit) {
   runs_changed_.notify_all();
   run_waiting_jobs();
   make_worker_ready();
+}
+
+void JobQueue::end_turn(const WorkerRun& run, const WorkerExit& exit) {
+  const auto turn = turns_.extract(run.assignment().job);
+  if (!turn) return;
+  const bool had_process = !exit.reason.empty();
+  if (!had_process) return waiting_.settle(turn.mapped(), 0);
+  constexpr double kNewest = 0.3, kLeastSeconds = 1e-3;
+  const double seconds = std::max(run.seconds(), kLeastSeconds);
+  // What is usual now comes first: else the first long bake after short ones would cost its client a night of turns.
+  usual_seconds_ = usual_seconds_ ? *usual_seconds_ + kNewest * (seconds - *usual_seconds_) : seconds;
+  waiting_.settle(turn.mapped(), seconds / *usual_seconds_);
 }
 
 void JobQueue::end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run, const std::string& reason) {
@@ -337,51 +364,6 @@ void JobQueue::end_job_run(const std::shared_ptr<Job>& job, const WorkerRun& run
                 internal_error(reason + (failed > 1 ? " (" + std::to_string(failed) + " attempts in a row)" : "")));
   }
   queue_again(job, reason + "; it goes on in another attempt", true);
-}
-
-Result<std::string> JobQueue::start_plan(const store::JobOwner& owner, const store::Work& work, PlanDone on_done) {
-  RADBAKE_RETURN_IF_ERROR(check_recovered());
-  return thread_.run([&] { return start_plan_run(owner, work, std::move(on_done)); });
-}
-
-Result<std::string> JobQueue::start_plan_run(const store::JobOwner& owner, const store::Work& work, PlanDone on_done) {
-  if (is_refusing_ || is_draining_) return Error{ErrorCode::kUnavailable, "the server is stopping: plan again later"};
-  if (plans_.size() >= options_.max_running_plans) {
-    return Error{ErrorCode::kResourceExhausted, std::to_string(plans_.size()) +
-                                                    " plans are being made, max_running_plans is " +
-                                                    std::to_string(options_.max_running_plans)};
-  }
-  RADBAKE_ASSIGN_OR_RETURN(store::ContentStore * content, content_.of(owner.tenant));
-  const std::string name = "plans/" + std::to_string(next_plan_++);
-  RunEvents events = ends_of(name);
-  events.on_progress = [](const JobProgress&) {};
-  events.on_tile = [](const std::string&) {};
-  const auto run = std::make_shared<WorkerRun>(
-      WorkerRun::Assignment{
-          .job = name, .is_plan = true, .work = work, .time_limit = options_.plan_limit, .trace_id = owner.trace_id},
-      options_.worker, *content, std::move(events));
-  add_run(run);
-  if (auto started = run->start(*gate_, std::move(ready_)); !started.ok()) {
-    const std::lock_guard lock(mutex_);
-    runs_.erase(name);
-    return started.error();
-  }
-  plans_[name] = std::move(on_done);
-  return name;
-}
-
-void JobQueue::cancel_plan(const std::string& name) {
-  thread_.post([this, name] {
-    if (const auto run = find_run(name)) request_cancel(*run);
-  });
-}
-
-void JobQueue::finish_plan(const std::string& name, Result<std::string> plan) {
-  const auto found = plans_.find(name);
-  if (found == plans_.end()) return;
-  const PlanDone on_done = std::move(found->second);
-  plans_.erase(found);
-  on_done(std::move(plan));
 }
 
 }  // namespace radbake::jobs

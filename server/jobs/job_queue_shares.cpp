@@ -13,7 +13,7 @@ std::shared_ptr<Job> JobQueue::find_leader(const store::JobOwner& owner, const s
   const auto sharers = sharers_.find(scoped(owner.tenant, bake_key));
   if (sharers == sharers_.end()) return nullptr;
   for (const auto& job : sharers->second) {
-    const std::string name = job->record().name;
+    const std::string& name = job->name();
     if (leaders_.contains(name) || to_finish_.contains(name) || is_unsaved(job)) continue;
     const auto run = find_run(name);
     if (!run || !run->is_cancel_requested()) return job;
@@ -37,7 +37,7 @@ void JobQueue::follow(const std::shared_ptr<Job>& follower, const std::shared_pt
 }
 
 void JobQueue::leave_leader(const std::shared_ptr<Job>& follower) {
-  const std::string name = follower->record().name;
+  const std::string& name = follower->name();
   if (const auto leader = leader_of(name)) leader->remove_follower(follower);
   leaders_.erase(name);
 }
@@ -46,13 +46,13 @@ void JobQueue::hand_over_followers(const std::shared_ptr<Job>& leader) {
   std::shared_ptr<Job> next;
   for (const auto& follower : leader->followers()) {
     leader->remove_follower(follower);
-    leaders_.erase(follower->record().name);
+    leaders_.erase(follower->name());
     if (next) {
       follow(follower, next);
       continue;
     }
     next = follower;
-    queue_again(next, "runs by itself: " + leader->record().name + " ended early", false);
+    queue_again(next, "runs by itself: " + leader->name() + " ended early", false);
   }
 }
 

@@ -10,7 +10,7 @@ QueueStats JobQueue::stats() const {
   const std::lock_guard lock(mutex_);
   QueueStats stats;
   for (const auto& [name, run] : runs_) ++(run->assignment().is_plan ? stats.num_plans : stats.num_running);
-  for (const auto& [name, job] : live_) stats.num_waiting += job->record().state == store::JobState::kQueued;
+  for (const auto& [name, job] : live_) stats.num_waiting += job->state() == store::JobState::kQueued;
   return stats;
 }
 

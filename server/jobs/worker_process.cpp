@@ -87,7 +87,6 @@ Result<std::unique_ptr<WorkerProcess>> WorkerProcess::start(const std::filesyste
   // The limits come after the start, and before the worker is sent anything that a client wrote.
   set_limit(pid, RLIMIT_CORE, 0);
   if (limits.address_space_bytes > 0) set_limit(pid, RLIMIT_AS, limits.address_space_bytes);
-  if (limits.cpu_seconds > 0) set_limit(pid, RLIMIT_CPU, limits.cpu_seconds);
   return std::unique_ptr<WorkerProcess>(new WorkerProcess(pid, std::move(read_end), std::move(on_exit)));
 }
 

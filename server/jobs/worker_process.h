@@ -20,7 +20,6 @@ namespace radbake::jobs {
 /// Bounds that the kernel holds a worker to; 0: none. A worker never writes a core file.
 struct ProcessLimits {
   std::uint64_t address_space_bytes = 0;
-  std::uint64_t cpu_seconds = 0;
 };
 
 /// How a worker's process ended.

@@ -1,5 +1,6 @@
 #include "server/jobs/worker_run.h"
 
+#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -44,10 +45,16 @@ Result<void> WorkerRun::start(WorkerGate& gate, std::unique_ptr<ReadyWorker> rea
     files.push_back(std::move(file));
   }
   for (const store::CheckpointRecord& checkpoint : assignment_.checkpoints) {
-    RADBAKE_ASSIGN_OR_RETURN(store::FileDescriptor file, content_.open_blob(checkpoint.digest));
-    order.checkpoints.push_back({checkpoint.name, {checkpoint.digest, file.get()}});
-    handed.inputs.push_back(file.get());
-    files.push_back(std::move(file));
+    auto file = content_.open_blob(checkpoint.digest);
+    if (!file.ok()) {
+      // The bake can do without it, unless the server is short of something for a moment.
+      if (file.error().code == ErrorCode::kUnavailable) return file.error();
+      spdlog::warn("{}: checkpoint '{}' is not used: {}", assignment_.job, checkpoint.name, file.error().message);
+      continue;
+    }
+    order.checkpoints.push_back({checkpoint.name, {checkpoint.digest, file->get()}});
+    handed.inputs.push_back(file->get());
+    files.push_back(std::move(file).value());
   }
   store::FileDescriptor socket;
   {
@@ -109,6 +116,17 @@ Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLi
   return {};
 }
 
+WorkerRun::Storing::Storing(WorkerRun& run) : run_(run) {
+  const std::lock_guard lock(run_.mutex_);
+  run_.is_storing_ = true;
+}
+
+WorkerRun::Storing::~Storing() {
+  const std::lock_guard lock(run_.mutex_);
+  run_.is_storing_ = false;
+  run_.last_heard_at_ = Clock::now();
+}
+
 bool WorkerRun::hear() {
   const std::lock_guard lock(mutex_);
   last_heard_at_ = Clock::now();
@@ -127,9 +145,14 @@ void WorkerRun::report_tile(const std::string& tile) {
 
 Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
   if (!hear()) return {};
+  const Storing storing(*this);
+  if (!refused_checkpoint_.empty() && refused_checkpoint_ == chunk.blob) {
+    if (chunk.digest) refused_checkpoint_.clear();
+    return {};
+  }
   if (!blob_.writer) {
     auto writer = content_.new_blob();
-    if (!writer.ok()) return refuse_chunk(writer.error());
+    if (!writer.ok()) return refuse_chunk(chunk, writer.error());
     blob_ = {chunk.blob, std::move(writer).value()};
   }
   if (chunk.blob != blob_.name || chunk.offset != blob_.writer->size()) {
@@ -137,21 +160,26 @@ Result<void> WorkerRun::report_chunk(const ResultChunk& chunk) {
                             "' after " + std::to_string(blob_.writer->size()) + " bytes of '" + blob_.name + "'");
   }
   if (auto appended = blob_.writer->append(std::as_bytes(std::span(chunk.bytes))); !appended.ok()) {
-    return refuse_chunk(appended.error());
+    return refuse_chunk(chunk, appended.error());
   }
   if (!chunk.digest) return {};
   store::failpoint("result.blob_complete");
   auto committed = content_.commit(*blob_.writer, *chunk.digest);
   blob_.writer.reset();
-  if (!committed.ok()) return refuse_chunk(committed.error());
+  if (!committed.ok()) return refuse_chunk(chunk, committed.error());
   if (chunk.is_checkpoint) events_.on_checkpoint({chunk.blob, *chunk.digest});
-  hear();  // forcing a large blob to the disk takes a while
   return {};
 }
 
-Result<void> WorkerRun::refuse_chunk(const Error& problem) {
-  // Bytes that are not what their digest says are the worker's fault.
-  if (problem.code == ErrorCode::kDataLoss) return problem;
+Result<void> WorkerRun::refuse_chunk(const ResultChunk& chunk, const Error& problem) {
+  // Bytes that are not what their digest says, and a digest that is none, are the worker's fault.
+  if (problem.code == ErrorCode::kDataLoss || problem.code == ErrorCode::kInvalidArgument) return problem;
+  if (chunk.is_checkpoint) {
+    spdlog::warn("{}: checkpoint '{}' is not kept: {}", assignment_.job, chunk.blob, problem.message);
+    blob_ = {};
+    if (!chunk.digest) refused_checkpoint_ = chunk.blob;
+    return {};
+  }
   kill("sent what cannot be kept (" + problem.message + ")", Blame::kServer);
   return {};
 }
@@ -228,7 +256,8 @@ std::optional<WorkerRun::Fault> WorkerRun::overstepped_limit(Clock::time_point n
   if (disconnected_at_ && now - *disconnected_at_ > options_.disconnect_grace) {
     return Fault{"closed its connection without a result"};
   }
-  if (now - last_heard_at_ > options_.silence_limit) {
+  // What it sends meanwhile waits until what it sent before is on the disk.
+  if (!is_storing_ && now - last_heard_at_ > options_.silence_limit) {
     return Fault{"gave no sign of life for " + in_seconds(options_.silence_limit)};
   }
   return std::nullopt;

@@ -74,7 +74,8 @@ class WorkerRun {
   Result<void> greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link);
   void report_progress(const JobProgress& progress);
   void report_tile(const std::string& tile);
-  /// Errors: kInvalidArgument for parts out of order; a disk that refuses ends the attempt.
+  /// Errors: kInvalidArgument for parts out of order, kDataLoss for wrong ones. A disk that refuses a part of a result
+  /// ends the attempt; one of a checkpoint: the checkpoint is not kept.
   Result<void> report_chunk(const ResultChunk& chunk);
   /// Blobs that a result names must be stored: an outcome that names others is a failure.
   void report_outcome(WorkOutcome outcome, const std::vector<Digest>& blobs);
@@ -111,8 +112,17 @@ class WorkerRun {
   /// Notes a sign of life. False: what it says does not count any more; it was killed, or has said how it ended.
   bool hear();
   std::optional<Fault> overstepped_limit(Clock::time_point now) const;
-  /// Ends the attempt where the disk, not the worker, is to blame.
-  Result<void> refuse_chunk(const Error& problem);
+  /// Ends the attempt where the disk, not the worker, is to blame and the part is needed.
+  Result<void> refuse_chunk(const ResultChunk& chunk, const Error& problem);
+  /// While the server stores what the worker sent, the worker is not heard and not held to be silent.
+  class Storing {
+   public:
+    explicit Storing(WorkerRun& run);
+    ~Storing();
+
+   private:
+    WorkerRun& run_;
+  };
   /// Starts a process that inherits the inputs; the server's end of its socket.
   Result<store::FileDescriptor> start_process(std::vector<int> inherited);
 
@@ -131,9 +141,12 @@ class WorkerRun {
   std::optional<Clock::time_point> accepted_at_;
   std::optional<Clock::time_point> disconnected_at_;
   bool has_outcome_ = false;
+  bool is_storing_ = false;
   std::string kill_reason_;
   Blame blame_ = Blame::kWorker;
-  GrowingBlob blob_;  // one after the other; touched by the worker's reports only
+  // Touched by the worker's reports only, which come one after the other.
+  GrowingBlob blob_;
+  std::string refused_checkpoint_;  // the rest of it is still to come
 
   std::unique_ptr<WorkerProcess> process_;  // set once, by start(), under mutex_
 };

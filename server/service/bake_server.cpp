@@ -99,7 +99,13 @@ Result<void> BakeServer::open_stores() {
       content_, store::TenantContent::open(options_.data / "content",
                                            {options_.limits.max_blob_bytes, options_.limits.max_content_bytes}));
   RADBAKE_ASSIGN_OR_RETURN(jobs_, store::JobStore::open(options_.data / "jobs.sqlite"));
-  housekeeping_ = std::make_unique<jobs::Housekeeping>(options_.housekeeping, *jobs_, *content_);
+  jobs::HousekeepingOptions housekeeping = options_.housekeeping;
+  housekeeping.lacking_bytes = [folder = options_.data, floor = options_.limits.min_free_disk_bytes] {
+    const auto free = free_disk_bytes(folder);
+    // Half as much more, so that it does not begin again at once.
+    return free.ok() && *free < floor ? floor + floor / 2 - *free : std::uint64_t{0};
+  };
+  housekeeping_ = std::make_unique<jobs::Housekeeping>(housekeeping, *jobs_, *content_);
   return {};
 }
 

@@ -44,7 +44,7 @@ struct ContentLimits {
 /// Whoever asks for a blob keeps it for a while: its file's time is set to now, and sweep() takes old ones only.
 ///
 /// Errors: kDataLoss for bytes that are not what their digest says; kResourceExhausted above a limit or on a full disk;
-/// kFailedPrecondition for a gap; kNotFound for a blob that is not there.
+/// kFailedPrecondition for a gap; kNotFound for a blob that is not there; kInternal from the disk.
 class ContentStore {
  public:
   /// Opens the store in a folder, creating it where missing. One process at a time.
@@ -65,8 +65,7 @@ class ContentStore {
   /// Received of all uploads that are not complete.
   std::uint64_t upload_bytes() const;
 
-  /// A blob whose digest is known only when its last byte is: a result. max_bytes does not hold for it: it has taken
-  /// hours.
+  /// A blob whose digest is known only when its last byte is: a result. No limit holds for it: it has taken hours.
   Result<std::unique_ptr<BlobWriter>> new_blob();
   Result<void> commit(BlobWriter& blob, const Digest& expected);
 
@@ -74,14 +73,17 @@ class ContentStore {
   Result<FileDescriptor> open_blob(const Digest& digest) const;
   Result<std::string> read_blob(const Digest& digest) const;
 
+  /// Removes a blob at once, whoever asked for it. None: nothing happens.
+  void remove(const Digest& digest);
+
   /// Of all blobs, and what uploads have reserved.
   std::uint64_t used_bytes() const;
   /// Called where an upload does not fit, with the bytes that are lacking; may sweep().
   void set_make_room(std::function<void(std::uint64_t bytes)> make_room) { make_room_ = std::move(make_room); }
   /// Removes blobs that nobody needs and nobody has asked for since a time, the oldest first, until so many bytes are
   /// free; and uploads that have rested as long. Returns the bytes.
-  std::uint64_t sweep(const std::set<Digest>& needed, std::chrono::system_clock::time_point unused_since,
-                      std::uint64_t bytes);
+  Result<std::uint64_t> sweep(const std::set<Digest>& needed, std::chrono::system_clock::time_point unused_since,
+                              std::uint64_t bytes);
   /// Closes the files of uploads that rest since a time; they go on where they ended.
   void close_resting_uploads(std::chrono::steady_clock::time_point since);
 
@@ -93,11 +95,17 @@ class ContentStore {
     std::mutex mutex;
     std::unique_ptr<BlobWriter> writer;  // null: its file is closed, or it has none yet
     bool is_over = false;                // complete or given up
+    std::atomic<std::uint64_t> num_bytes = 0;
     std::chrono::steady_clock::time_point used_at;
   };
 
+  static constexpr const char* kUploadPrefix = "upload-";
+
   ContentStore(std::filesystem::path folder, const ContentLimits& limits);
   Result<void> take_stock();
+  Result<void> take_stock_of_uploads();
+  /// The folder of a blob, created and forced to the disk where it is the first there.
+  Result<std::filesystem::path> make_shelf(const Digest& digest);
   Result<void> validate(const Digest& digest) const;
   std::filesystem::path path_of(const Digest& digest) const;
   std::filesystem::path upload_path(const Digest& digest) const;
@@ -115,6 +123,7 @@ class ContentStore {
   mutable std::mutex mutex_;            // guards what follows
   std::uint64_t object_bytes_ = 0, reserved_bytes_ = 0;
   std::map<Digest, std::shared_ptr<Upload>> uploads_;
+  std::set<std::filesystem::path> shelves_;  // that are on the disk
 };
 
 }  // namespace radbake::store

@@ -107,6 +107,7 @@ struct CheckpointRecord {
 struct RecordedChange {
   JobRecord record;
   JobEvent event;
+  std::vector<Digest> unneeded;  ///< blobs of checkpoints that ended with it
 };
 
 }  // namespace radbake::store

@@ -212,7 +212,9 @@ Result<RecordedChange> JobStore::append_event(const std::string& name, const Sta
       RADBAKE_RETURN_IF_ERROR(update.execute());
       RADBAKE_RETURN_IF_ERROR(insert_event(job.id, recorded.event));
       RADBAKE_RETURN_IF_ERROR(insert_outputs(job.id, change.outputs));
-      if (is_terminal(change.state)) RADBAKE_RETURN_IF_ERROR(drop_checkpoints_of_nobody(job));
+      if (is_terminal(change.state)) {
+        RADBAKE_ASSIGN_OR_RETURN(recorded.unneeded, drop_checkpoints_of_nobody(job));
+      }
       RADBAKE_ASSIGN_OR_RETURN(recorded.record, read_job("name=?", name));
       return {};
     }));

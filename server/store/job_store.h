@@ -63,9 +63,11 @@ class JobStore {
   /// Every blob that something of a tenant's needs: inputs of jobs that have not ended, results, checkpoints.
   Result<std::set<Digest>> needed_blobs(const std::string& tenant);
 
+  // Checkpoints: what is put or dropped returns the blobs that no checkpoint of the tenant names any more.
+
   /// In the place of an earlier one of that name; the job has got on: its lost and failed attempts count from 0 again.
-  Result<void> put_checkpoint(const JobRecord& job, const CheckpointRecord& checkpoint);
-  Result<void> drop_checkpoints(const JobRecord& job, const std::vector<std::string>& names);
+  Result<std::vector<Digest>> put_checkpoint(const JobRecord& job, const CheckpointRecord& checkpoint);
+  Result<std::vector<Digest>> drop_checkpoints(const JobRecord& job, const std::vector<std::string>& names);
   Result<std::vector<CheckpointRecord>> checkpoints(const JobRecord& job);
 
   /// Forgets jobs of a tenant that ended before a time, at most so many, oldest first; how many there were.
@@ -77,7 +79,9 @@ class JobStore {
   Result<JobRecord> read_row(Statement& row);
   Result<JobRecord> with_inputs(JobRecord job);
   Result<void> insert_event(std::int64_t job, const JobEvent& event);
-  Result<void> drop_checkpoints_of_nobody(const JobRecord& ended);
+  Result<std::vector<Digest>> drop_checkpoints_of_nobody(const JobRecord& ended);
+  /// One of a bake's, or all.
+  Result<std::vector<Digest>> delete_checkpoints(const JobRecord& job, const std::optional<std::string>& name);
   Result<void> insert_outputs(std::int64_t job, const std::vector<Digest>& outputs);
 
   Database database_;

@@ -76,11 +76,38 @@ Result<std::set<Digest>> JobStore::needed_blobs(const std::string& tenant) {
   });
 }
 
-Result<void> JobStore::put_checkpoint(const JobRecord& job, const CheckpointRecord& checkpoint) {
-  return thread_.run([&]() -> Result<void> {
-    return database_.in_transaction([&]() -> Result<void> {
-      RADBAKE_ASSIGN_OR_RETURN(Statement put,
-                               database_.prepare("INSERT OR REPLACE INTO checkpoints VALUES (?, ?, ?, ?, ?)"));
+Result<std::vector<Digest>> JobStore::delete_checkpoints(const JobRecord& job, const std::optional<std::string>& name) {
+  std::vector<Digest> unneeded;
+  const auto bind = [&](Statement& statement) {
+    statement.bind_text(1, job.owner.tenant).bind_text(2, checkpoint_key(job));
+    if (name) statement.bind_text(3, *name);  // else it is null
+  };
+  {
+    // Equal bakes that leave each other alone may have left equal blobs.
+    RADBAKE_ASSIGN_OR_RETURN(
+        Statement rows,
+        database_.prepare(
+            "SELECT DISTINCT sha256, size FROM checkpoints WHERE tenant=?1 AND bake_key=?2 AND (?3 IS NULL "
+            "OR name=?3) AND sha256 NOT IN (SELECT sha256 FROM checkpoints WHERE tenant=?1 AND NOT "
+            "(bake_key=?2 AND (?3 IS NULL OR name=?3)))"));
+    bind(rows);
+    RADBAKE_RETURN_IF_ERROR(read_digests(rows, unneeded));
+  }
+  RADBAKE_ASSIGN_OR_RETURN(
+      Statement drop,
+      database_.prepare("DELETE FROM checkpoints WHERE tenant=?1 AND bake_key=?2 AND (?3 IS NULL OR name=?3)"));
+  bind(drop);
+  RADBAKE_RETURN_IF_ERROR(drop.execute());
+  return unneeded;
+}
+
+Result<std::vector<Digest>> JobStore::put_checkpoint(const JobRecord& job, const CheckpointRecord& checkpoint) {
+  return thread_.run([&]() -> Result<std::vector<Digest>> {
+    std::vector<Digest> unneeded;
+    RADBAKE_RETURN_IF_ERROR(database_.in_transaction([&]() -> Result<void> {
+      RADBAKE_ASSIGN_OR_RETURN(unneeded, delete_checkpoints(job, checkpoint.name));
+      std::erase(unneeded, checkpoint.digest);
+      RADBAKE_ASSIGN_OR_RETURN(Statement put, database_.prepare("INSERT INTO checkpoints VALUES (?, ?, ?, ?, ?)"));
       put.bind_text(1, job.owner.tenant).bind_text(2, checkpoint_key(job)).bind_text(3, checkpoint.name);
       put.bind_text(4, checkpoint.digest.sha256).bind(5, static_cast<std::int64_t>(checkpoint.digest.size_bytes));
       RADBAKE_RETURN_IF_ERROR(put.execute());
@@ -88,31 +115,32 @@ Result<void> JobStore::put_checkpoint(const JobRecord& job, const CheckpointReco
                                database_.prepare("UPDATE jobs SET lost_attempts=0, failed_attempts=0 WHERE id=?"));
       reset.bind(1, job.id);
       return reset.execute();
-    });
+    }));
+    return unneeded;
   });
 }
 
-Result<void> JobStore::drop_checkpoints(const JobRecord& job, const std::vector<std::string>& names) {
-  return thread_.run([&]() -> Result<void> {
-    return database_.in_transaction([&]() -> Result<void> {
+Result<std::vector<Digest>> JobStore::drop_checkpoints(const JobRecord& job, const std::vector<std::string>& names) {
+  return thread_.run([&]() -> Result<std::vector<Digest>> {
+    std::vector<Digest> unneeded;
+    RADBAKE_RETURN_IF_ERROR(database_.in_transaction([&]() -> Result<void> {
       for (const std::string& name : names) {
-        RADBAKE_ASSIGN_OR_RETURN(Statement drop,
-                                 database_.prepare("DELETE FROM checkpoints WHERE tenant=? AND bake_key=? AND name=?"));
-        drop.bind_text(1, job.owner.tenant).bind_text(2, checkpoint_key(job)).bind_text(3, name);
-        RADBAKE_RETURN_IF_ERROR(drop.execute());
+        RADBAKE_ASSIGN_OR_RETURN(const std::vector<Digest> more, delete_checkpoints(job, name));
+        unneeded.insert(unneeded.end(), more.begin(), more.end());
       }
       return {};
-    });
+    }));
+    return unneeded;
   });
 }
 
-Result<void> JobStore::drop_checkpoints_of_nobody(const JobRecord& ended) {
-  RADBAKE_ASSIGN_OR_RETURN(
-      Statement drop,
-      database_.prepare("DELETE FROM checkpoints WHERE tenant=?1 AND bake_key=?2 AND NOT EXISTS (SELECT 1 FROM jobs "
-                        "WHERE bake_key=?2 AND tenant=?1 AND is_shared=1 AND state<?3)"));
-  drop.bind_text(1, ended.owner.tenant).bind_text(2, checkpoint_key(ended)).bind(3, kSucceeded);
-  return drop.execute();
+Result<std::vector<Digest>> JobStore::drop_checkpoints_of_nobody(const JobRecord& ended) {
+  RADBAKE_ASSIGN_OR_RETURN(Statement others, database_.prepare("SELECT 1 FROM jobs WHERE bake_key=? AND tenant=? AND "
+                                                               "is_shared=1 AND state<? LIMIT 1"));
+  others.bind_text(1, checkpoint_key(ended)).bind_text(2, ended.owner.tenant).bind(3, kSucceeded);
+  RADBAKE_ASSIGN_OR_RETURN(const bool has_others, others.step());
+  if (has_others) return std::vector<Digest>();
+  return delete_checkpoints(ended, std::nullopt);
 }
 
 Result<std::vector<CheckpointRecord>> JobStore::checkpoints(const JobRecord& job) {

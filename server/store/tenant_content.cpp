@@ -16,31 +16,42 @@ TenantContent::TenantContent(std::filesystem::path folder, const ContentLimits& 
     : folder_(std::move(folder)), limits_(limits) {}
 
 Result<ContentStore*> TenantContent::of(const std::string& tenant) {
-  const std::lock_guard lock(mutex_);
-  if (const auto found = stores_.find(tenant); found != stores_.end()) return found->second.get();
-  // A digest, since a name may hold anything.
-  const std::filesystem::path folder = tenant.empty() ? folder_ : folder_ / "tenants" / digest_of(tenant).sha256;
-  RADBAKE_ASSIGN_OR_RETURN(std::unique_ptr<ContentStore> store, ContentStore::open(folder, limits_));
-  tell_make_room(tenant, *store);
-  return (stores_[tenant] = std::move(store)).get();
+  std::shared_ptr<Entry> entry;
+  {
+    const std::lock_guard lock(mutex_);
+    std::shared_ptr<Entry>& known = stores_[tenant];
+    if (!known) known = std::make_shared<Entry>();
+    entry = known;
+  }
+  if (ContentStore* const opened = entry->opened) return opened;
+  return open_store(tenant, *entry);
 }
 
-void TenantContent::tell_make_room(const std::string& tenant, ContentStore& content) {
-  if (!make_room_) return;
-  content.set_make_room([this, tenant, &content](std::uint64_t bytes) { make_room_(tenant, content, bytes); });
-}
-
-std::uint64_t TenantContent::upload_bytes() {
-  std::uint64_t total = 0;
-  for_each([&](const std::string&, ContentStore& content) { total += content.upload_bytes(); });
-  return total;
+Result<ContentStore*> TenantContent::open_store(const std::string& tenant, Entry& entry) {
+  const std::lock_guard opening(entry.opening);
+  if (!entry.store) {
+    // A digest, since a name may hold anything.
+    const std::filesystem::path folder = tenant.empty() ? folder_ : folder_ / "tenants" / digest_of(tenant).sha256;
+    RADBAKE_ASSIGN_OR_RETURN(entry.store, ContentStore::open(folder, limits_));
+    if (!tenant.empty()) RADBAKE_RETURN_IF_ERROR(sync_folder(folder_, folder_.string()));
+    entry.store->set_make_room([this, tenant, content = entry.store.get()](std::uint64_t bytes) {
+      std::unique_lock lock(mutex_);
+      const auto make_room = make_room_;
+      lock.unlock();
+      if (make_room) make_room(tenant, *content, bytes);
+    });
+    entry.opened = entry.store.get();
+  }
+  return entry.store.get();
 }
 
 void TenantContent::for_each(const std::function<void(const std::string&, ContentStore&)>& visit) {
   std::vector<std::pair<std::string, ContentStore*>> stores;
   {
     const std::lock_guard lock(mutex_);
-    for (const auto& [tenant, store] : stores_) stores.emplace_back(tenant, store.get());
+    for (const auto& [tenant, entry] : stores_) {
+      if (ContentStore* const opened = entry->opened) stores.emplace_back(tenant, opened);
+    }
   }
   for (const auto& [tenant, store] : stores) visit(tenant, *store);
 }
@@ -48,7 +59,6 @@ void TenantContent::for_each(const std::function<void(const std::string&, Conten
 void TenantContent::set_make_room(std::function<void(const std::string&, ContentStore&, std::uint64_t)> room) {
   const std::lock_guard lock(mutex_);
   make_room_ = std::move(room);
-  for (const auto& [tenant, store] : stores_) tell_make_room(tenant, *store);
 }
 
 }  // namespace radbake::store

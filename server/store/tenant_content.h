@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -20,21 +21,26 @@ class TenantContent {
   /// Opens the tenant's store where it is not. The server's own, of the empty name, always is. It stays open, and where
   /// it is. Errors: as ContentStore::open().
   Result<ContentStore*> of(const std::string& tenant);
-  /// Received of all uploads that are not complete, in the stores that are open.
-  std::uint64_t upload_bytes();
   /// Those that are open.
   void for_each(const std::function<void(const std::string& tenant, ContentStore& content)>& visit);
-  /// As ContentStore's; for stores that are opened later, too.
+  /// As ContentStore's; for stores that are opened later, too. Empty: nobody makes room any more.
   void set_make_room(std::function<void(const std::string& tenant, ContentStore& content, std::uint64_t bytes)> room);
 
  private:
+  /// One that is being opened keeps only its own tenant waiting.
+  struct Entry {
+    std::mutex opening;
+    std::unique_ptr<ContentStore> store;          // set once, under `opening`
+    std::atomic<ContentStore*> opened = nullptr;  // the same, for all to read
+  };
+
   TenantContent(std::filesystem::path folder, const ContentLimits& limits);
-  void tell_make_room(const std::string& tenant, ContentStore& content);
+  Result<ContentStore*> open_store(const std::string& tenant, Entry& entry);
 
   const std::filesystem::path folder_;
   const ContentLimits limits_;
   std::mutex mutex_;  // guards what follows
-  std::map<std::string, std::unique_ptr<ContentStore>> stores_;
+  std::map<std::string, std::shared_ptr<Entry>> stores_;
   std::function<void(const std::string&, ContentStore&, std::uint64_t)> make_room_;
 };
 

@@ -80,5 +80,58 @@ TEST_F(JobQueueTest, BlamesNoWorkerForWhatItSendsAfterTheDiskRefused) {
   EXPECT_EQ(job->record().failed_attempts, 0u);
 }
 
+TEST_F(JobQueueTest, BakesOnWithoutACheckpointThatTheDiskRefuses) {
+  const auto job = submit("a");
+  const auto run = greet(job);
+  ASSERT_NE(run, nullptr);
+  const std::string rows = "some rows", texels = "texels";
+  {
+    const DatabaseOutage outage;
+    EXPECT_TRUE(run->report_chunk({"rows", 0, "some ", std::nullopt, true}).ok());
+  }
+  EXPECT_TRUE(run->report_chunk({"rows", 5, "rows", digest_of(rows), true}).ok());  // what is left of it
+  EXPECT_TRUE(run->report_chunk({"pass", 0, rows, digest_of(rows), true}).ok());
+  EXPECT_TRUE(run->report_chunk({"lightmap_0", 0, texels, digest_of(texels)}).ok());
+  EXPECT_TRUE(wait_until([&] { return jobs_->checkpoints(job->record())->size() == 1; }));
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {digest_of(texels)});
+  EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
+  EXPECT_EQ(job->record().attempt, 1u);
+}
+
+TEST_F(JobQueueTest, RecordsTheEndOfAFollowerWhenTheDiskTakesItAgain) {
+  const auto leader = submit("a", "key"), follower = submit("b", "key");
+  const auto run = greet(leader);
+  ASSERT_NE(run, nullptr);
+  EXPECT_TRUE(wait_for(follower, JobState::kPreparing));
+  static std::atomic<int> num_commits;
+  num_commits = 0;
+  store::fault_hook = [](const char* operation) {
+    // The leader's end is recorded, the follower's is not.
+    return std::string(operation) == "commit" && ++num_commits == 2 ? ENOSPC : 0;
+  };
+  run->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  EXPECT_TRUE(wait_for(leader, JobState::kSucceeded));
+  EXPECT_TRUE(wait_for(follower, JobState::kSucceeded));
+  store::fault_hook = nullptr;
+  EXPECT_GE(num_commits, 3);
+}
+
+TEST_F(JobQueueTest, HoldsNoWorkerToBeSilentWhileItsResultGoesToTheDisk) {
+  options_.worker.silence_limit = 200ms;
+  open("sleep 1000");
+  const auto job = submit("a");
+  const auto run = greet(job);
+  ASSERT_NE(run, nullptr);
+  store::fault_hook = [](const char* operation) {
+    if (std::string(operation) == "sync") std::this_thread::sleep_for(600ms);
+    return 0;
+  };
+  const std::string texels = "texels";
+  EXPECT_TRUE(run->report_chunk({"lightmap_0", 0, texels, digest_of(texels)}).ok());
+  store::fault_hook = nullptr;
+  EXPECT_EQ(run->kill_reason(), "");
+  EXPECT_TRUE(wait_until([&] { return !run->kill_reason().empty(); }));  // but from now on
+}
+
 }  // namespace
 }  // namespace radbake::jobs

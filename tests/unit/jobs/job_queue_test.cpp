@@ -215,6 +215,10 @@ TEST_F(JobQueueTest, GivesTheNextAttemptWhatTheLastOneLeft) {
   next->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
   EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
   EXPECT_TRUE(jobs_->checkpoints(job->record())->empty());
+  // Nor is there anything left of them.
+  for (const std::string& text : {rows, pass}) {
+    EXPECT_TRUE(wait_until([&] { return !(*content_->of(""))->contains(digest_of(text)); }));
+  }
 }
 
 TEST_F(JobQueueTest, TellsWhereAJobStandsInTheQueue) {
@@ -255,6 +259,34 @@ TEST(Job, KeepsOnlyTheLatestProgress) {
   job.unsubscribe(subscription);
   job.set_progress({});
   EXPECT_EQ(num_calls, 5);
+}
+
+TEST_F(JobQueueTest, DoesNotListenToAnAttemptThatEnded) {
+  options_.max_failed_attempts = 2;
+  open("[ $6 = 2 ] || { sleep 0.5; exit 3; }; sleep 1000");
+  const auto job = submit("a");
+  const auto first = greet(job);
+  ASSERT_NE(first, nullptr);
+  EXPECT_TRUE(wait_until([&] { return num_starts_of(job) == 2; }));
+  const std::string rows = "some rows";
+  EXPECT_TRUE(first->report_chunk({"rows", 0, rows, digest_of(rows), true}).ok());
+  first->report_dropped_checkpoints({"rows"});
+  first->report_outcome({WorkOutcome::Kind::kSucceeded, "late", {}}, {});
+  link_ = std::make_shared<FakeLink>();
+  const auto second = greet(job, 2);
+  ASSERT_NE(second, nullptr);
+  second->report_outcome({WorkOutcome::Kind::kSucceeded, "result", {}}, {});
+  EXPECT_TRUE(wait_for(job, JobState::kSucceeded));
+  EXPECT_EQ(job->record().result, "result");
+}
+
+TEST_F(JobQueueTest, EndsABakeThatTakesTooLong) {
+  options_.bake_limit = 50ms;
+  options_.max_failed_attempts = 3;
+  open("sleep 1000");
+  const auto job = submit("a");
+  EXPECT_EQ(error_of(job), "the worker took longer than its limit of 0.05 s and was stopped");
+  EXPECT_EQ(job->record().attempt, 1u);
 }
 
 }  // namespace

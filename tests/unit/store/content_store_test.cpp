@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cerrno>
 #include <fstream>
 #include <thread>
 
+#include "server/store/failpoint.h"
 #include "server/store/tenant_content.h"
 #include "tests/unit/store/temporary_folder.h"
 
@@ -242,19 +245,19 @@ TEST_F(ContentStoreTest, SweepsTheOldestFirstAndNothingThatIsNeededOrWasAskedFor
   age(older, std::chrono::hours(10));
   EXPECT_TRUE(store_->contains(asked_for));
   const auto before = std::chrono::system_clock::now() - std::chrono::hours(1);
-  EXPECT_EQ(store_->sweep({needed}, before, 1), older.size_bytes);
+  EXPECT_EQ(*store_->sweep({needed}, before, 1), older.size_bytes);
   EXPECT_TRUE(store_->contains(old));
   age(old, std::chrono::hours(10));
-  EXPECT_EQ(store_->sweep({needed}, before, 1000), old.size_bytes);
+  EXPECT_EQ(*store_->sweep({needed}, before, 1000), old.size_bytes);
   for (const Digest& digest : {needed, asked_for, young}) EXPECT_TRUE(store_->contains(digest));
 }
 
 TEST_F(ContentStoreTest, SweepsUploadsThatNobodyGoesOnWith) {
   ASSERT_TRUE(store_->append_upload(digest_, 0, bytes_of(text_.substr(0, 7))).ok());
   const auto now = std::chrono::system_clock::now() + std::chrono::hours(1);
-  EXPECT_EQ(store_->sweep({}, now, 1000), 0u);  // somebody holds it open
+  EXPECT_EQ(*store_->sweep({}, now, 1000), 0u);  // somebody holds it open
   store_->close_resting_uploads(std::chrono::steady_clock::now());
-  EXPECT_EQ(store_->sweep({}, now, 1000), text_.size());
+  EXPECT_EQ(*store_->sweep({}, now, 1000), text_.size());
   EXPECT_EQ(num_temporaries(), 0u);
   EXPECT_EQ(store_->used_bytes(), 0u);
 }
@@ -273,6 +276,33 @@ TEST(TenantContent, KeepsTheContentOfTenantsApart) {
   EXPECT_EQ(&**content->of("../first"), &first);
   content = std::move(TenantContent::open(folder.path(), {kMaxBlobBytes, 0})).value();
   EXPECT_TRUE((*content->of("../first"))->contains(digest));
+}
+
+TEST_F(ContentStoreTest, KeepsResultsOfAnySizeAndRemovesThem) {
+  const std::string result(kMaxBlobBytes + 1, 'r');
+  auto writer = store_->new_blob();
+  ASSERT_TRUE(writer.ok());
+  ASSERT_TRUE((*writer)->append(std::as_bytes(std::span(result))).ok());
+  ASSERT_TRUE(store_->commit(**writer, digest_of(result)).ok());
+  EXPECT_EQ(store_->used_bytes(), result.size());
+  store_->remove(digest_of(result));
+  EXPECT_FALSE(store_->contains(digest_of(result)));
+  EXPECT_EQ(store_->used_bytes(), 0u);
+}
+
+TEST_F(ContentStoreTest, TakesNoNameForKeptWhoseFolderIsNotForcedToTheDisk) {
+  auto writer = store_->new_blob();
+  ASSERT_TRUE(writer.ok());
+  ASSERT_TRUE((*writer)->append(std::as_bytes(std::span(text_))).ok());
+  static std::atomic<int> num_syncs;
+  num_syncs = 0;
+  // The shelf's folder, the blob, and then the shelf.
+  fault_hook = [](const char* operation) { return std::string(operation) == "sync" && ++num_syncs == 3 ? EIO : 0; };
+  const auto committed = store_->commit(**writer, digest_of(text_));
+  fault_hook = nullptr;
+  EXPECT_FALSE(committed.ok());
+  EXPECT_FALSE(store_->contains(digest_of(text_)));
+  EXPECT_EQ(store_->used_bytes(), 0u);
 }
 
 }  // namespace

@@ -23,6 +23,8 @@ import history  # noqa: E402
 from history import LIMIT_SECONDS  # noqa: E402
 
 SCENE = SCENES / "goral.glb"
+# So many kills for each failpoint make it sure that each was come to.
+ALL_POINTS = 4
 # Of what a round waits for before it kills at random.
 ROUND_SECONDS = 4
 
@@ -146,9 +148,15 @@ def main():
         faults = list(history.faults_of_all(clients, expected, place / "data" / "content"))
         if exit_code != 0:
             faults.append(f"the last server ended with {exit_code}")
+        num_resumed = (place / "log").read_text().count("goes on from checkpoint")
+        if num_resumed == 0:
+            faults.append("no worker went on from a checkpoint")
+        faults += [f"no server came to {point}" for point in failpoints if arguments.kills >= ALL_POINTS * len(failpoints)
+                   and kills[point] == 0]
         attempts = sum(seen.finished.attempt for seen in clients.histories if seen.finished)
         print(f"{sum(kills.values())} kills in {time.monotonic() - began:.0f} s: {dict(kills)}")
-        print(f"{len(clients.histories)} bakes accepted, {attempts} attempts, {len(faults)} faults")
+        print(f"{len(clients.histories)} bakes accepted, {attempts} attempts, {num_resumed} checkpoints used, "
+              f"{len(faults)} faults")
         for fault in faults:
             print(fault)
         if faults:

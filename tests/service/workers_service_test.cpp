@@ -173,15 +173,17 @@ TEST_F(ReadyWorkersTest, AreDoneWithoutWhereTheyDoNotWait) {
   }
 }
 
-TEST_F(WorkersServiceTest, HoldsAWorkerToItsLimits) {
+TEST_F(WorkersServiceTest, HoldsAWorkerToItsTime) {
   TemporaryFolder folder;
   service::BakeServerOptions options = options_in(folder.path());
-  options.queue.worker.limits.cpu_seconds = 1;
-  options.queue.worker.silence_limit = 30s;
+  options.queue.bake_limit = 2s;
   TestServer server(options);
   TestClient client = server.client();
-  // A limit that a normal worker does not reach changes nothing.
   EXPECT_EQ(client.watch(client.submit(kSucceed).name()).finished().state(), v1::SUCCEEDED);
+  const v1::Bake endless = client.watch(client.submit(kRunUntilCancelled).name()).finished();
+  EXPECT_EQ(endless.state(), v1::FAILED);
+  EXPECT_EQ(endless.error().message(), "the worker took longer than its limit of 2 s and was stopped");
+  EXPECT_EQ(endless.attempt(), 1u);
 }
 
 }  // namespace

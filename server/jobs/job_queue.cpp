@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "common/base/unix_time.h"
 #include "common/log/log.h"
 
 namespace radbake::jobs {
@@ -13,15 +14,6 @@ namespace radbake::jobs {
 using store::JobRecord;
 using store::JobState;
 using store::StateChange;
-
-namespace {
-
-std::int64_t unix_ms_now() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-}  // namespace
 
 JobQueue::JobQueue(QueueOptions options, store::JobStore& jobs, store::TenantContent& content)
     : options_(std::move(options)), store_(jobs), content_(content) {}

@@ -2,22 +2,30 @@
 
 #include <sys/socket.h>
 
-#include <array>
 #include <chrono>
 #include <utility>
 
 namespace radbake::jobs {
 
-Result<std::unique_ptr<ReadyWorker>> ReadyWorker::start(const WorkerOptions& options) {
+Result<StartedWorker> start_worker(const WorkerOptions& options, const std::vector<std::string>& arguments,
+                                   std::vector<int> inherited, std::function<void(const WorkerExit&)> on_exit) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0) {
-    return store::system_error("cannot create a socket for a worker");
+    return Error{ErrorCode::kUnavailable, store::system_error("cannot create a socket for a worker").message};
   }
-  std::unique_ptr<ReadyWorker> worker(new ReadyWorker());
-  worker->socket_ = store::FileDescriptor(ends[0]);
+  store::FileDescriptor ours(ends[0]);
   const store::FileDescriptor theirs(ends[1]);
-  std::vector<std::string> arguments = {"--fd", std::to_string(theirs.get()), "--wait"};
-  if (options.log_json) arguments.emplace_back("--log-json");
+  inherited.push_back(theirs.get());
+  std::vector<std::string> all = {"--fd", std::to_string(theirs.get())};
+  all.insert(all.end(), arguments.begin(), arguments.end());
+  if (options.log_json) all.emplace_back("--log-json");
+  auto process = WorkerProcess::start(options.program, all, inherited, options.limits, std::move(on_exit));
+  if (!process.ok()) return Error{ErrorCode::kUnavailable, process.error().message};
+  return StartedWorker{std::move(process).value(), std::move(ours)};
+}
+
+Result<std::unique_ptr<ReadyWorker>> ReadyWorker::start(const WorkerOptions& options) {
+  std::unique_ptr<ReadyWorker> worker(new ReadyWorker());
   const auto on_exit = [ending = worker->ending_](const WorkerExit& exit) {
     std::unique_lock lock(ending->mutex);
     ending->has_ended = true;
@@ -25,18 +33,16 @@ Result<std::unique_ptr<ReadyWorker>> ReadyWorker::start(const WorkerOptions& opt
     lock.unlock();
     if (told) told(exit);
   };
-  const std::array inherited = {theirs.get()};
-  RADBAKE_ASSIGN_OR_RETURN(worker->process_,
-                           WorkerProcess::start(options.program, arguments, inherited, options.limits, on_exit));
+  RADBAKE_ASSIGN_OR_RETURN(worker->worker_, start_worker(options, {"--wait"}, {}, on_exit));
   return worker;
 }
 
-std::optional<ReadyWorker::Hired> ReadyWorker::hire(const handover::Assignment& assignment,
-                                                    std::function<void(const WorkerExit&)> on_exit) {
+std::optional<StartedWorker> ReadyWorker::hire(const handover::Assignment& assignment,
+                                               std::function<void(const WorkerExit&)> on_exit) {
   // One that is gone, or does not get so far, is no loss: another is started. To wait for it costs less than that.
   constexpr std::chrono::milliseconds kPatience{200};
-  if (!handover::fits(assignment) || !handover::is_announced(socket_.get(), kPatience) ||
-      !handover::give(socket_.get(), assignment).ok()) {
+  if (!handover::fits(assignment) || !handover::is_announced(worker_.socket.get(), kPatience) ||
+      !handover::give(worker_.socket.get(), assignment).ok()) {
     return std::nullopt;
   }
   {
@@ -44,7 +50,7 @@ std::optional<ReadyWorker::Hired> ReadyWorker::hire(const handover::Assignment& 
     if (ending_->has_ended) return std::nullopt;
     ending_->on_exit = std::move(on_exit);
   }
-  return Hired{std::move(process_), std::move(socket_)};
+  return std::move(worker_);
 }
 
 }  // namespace radbake::jobs

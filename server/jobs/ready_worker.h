@@ -3,6 +3,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "server/handover/handover.h"
@@ -12,6 +14,17 @@
 
 namespace radbake::jobs {
 
+/// A worker's process and the server's end of its socket.
+struct StartedWorker {
+  std::unique_ptr<WorkerProcess> process;
+  store::FileDescriptor socket;
+};
+
+/// Starts a process that is told the number of its socket, `arguments` beside that, and inherits descriptors. Errors:
+/// kUnavailable: the system starts none now.
+Result<StartedWorker> start_worker(const WorkerOptions& options, const std::vector<std::string>& arguments,
+                                   std::vector<int> inherited, std::function<void(const WorkerExit&)> on_exit);
+
 /// A worker that was started ahead of need: it has loaded its libraries and waits to be told its job.
 class ReadyWorker {
  public:
@@ -19,13 +32,10 @@ class ReadyWorker {
   /// Kills it, unless it was hired.
   ~ReadyWorker() = default;
 
-  struct Hired {
-    std::unique_ptr<WorkerProcess> process;
-    store::FileDescriptor socket;  ///< the server's end
-  };
   /// Gives it a job; `on_exit` is called once when it has ended. Empty if it is gone or the job does not fit: nothing
   /// is called then. Call once.
-  std::optional<Hired> hire(const handover::Assignment& assignment, std::function<void(const WorkerExit&)> on_exit);
+  std::optional<StartedWorker> hire(const handover::Assignment& assignment,
+                                    std::function<void(const WorkerExit&)> on_exit);
 
  private:
   /// Shared with the process's own thread.
@@ -38,8 +48,7 @@ class ReadyWorker {
   ReadyWorker() = default;
 
   std::shared_ptr<Ending> ending_ = std::make_shared<Ending>();
-  store::FileDescriptor socket_;
-  std::unique_ptr<WorkerProcess> process_;
+  StartedWorker worker_;
 };
 
 }  // namespace radbake::jobs

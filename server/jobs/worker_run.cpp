@@ -1,7 +1,6 @@
 #include "server/jobs/worker_run.h"
 
 #include <spdlog/spdlog.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <utility>
@@ -61,32 +60,17 @@ Result<void> WorkerRun::start(WorkerGate& gate, std::unique_ptr<ReadyWorker> rea
     const std::lock_guard lock(mutex_);
     order_ = std::move(order);
     started_at_ = last_heard_at_ = Clock::now();
-    if (auto hired = ready ? ready->hire(handed, events_.on_exit) : std::nullopt) {
-      process_ = std::move(hired->process);
-      socket = std::move(hired->socket);
-    } else {
-      auto started = start_process(std::move(handed.inputs));
-      if (!started.ok()) return Error{ErrorCode::kUnavailable, started.error().message};
-      socket = std::move(started).value();
+    auto worker = ready ? ready->hire(handed, events_.on_exit) : std::nullopt;
+    if (!worker) {
+      const std::vector<std::string> arguments = {"--job", assignment_.job, "--attempt",
+                                                  std::to_string(assignment_.attempt)};
+      RADBAKE_ASSIGN_OR_RETURN(worker, start_worker(options_, arguments, std::move(handed.inputs), events_.on_exit));
     }
+    process_ = std::move(worker->process);
+    socket = std::move(worker->socket);
   }
   gate.adopt(std::move(socket));
   return {};
-}
-
-Result<store::FileDescriptor> WorkerRun::start_process(std::vector<int> inherited) {
-  int ends[2];
-  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0) {
-    return store::system_error("cannot create a socket for a worker");
-  }
-  store::FileDescriptor ours(ends[0]), theirs(ends[1]);
-  inherited.push_back(theirs.get());
-  std::vector<std::string> arguments = {"--fd",      std::to_string(theirs.get()),       "--job", assignment_.job,
-                                        "--attempt", std::to_string(assignment_.attempt)};
-  if (options_.log_json) arguments.emplace_back("--log-json");
-  RADBAKE_ASSIGN_OR_RETURN(
-      process_, WorkerProcess::start(options_.program, arguments, inherited, options_.limits, events_.on_exit));
-  return ours;
 }
 
 Result<void> WorkerRun::greet(const WorkerHello& hello, std::shared_ptr<WorkerLink> link) {

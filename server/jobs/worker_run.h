@@ -123,8 +123,6 @@ class WorkerRun {
    private:
     WorkerRun& run_;
   };
-  /// Starts a process that inherits the inputs; the server's end of its socket.
-  Result<store::FileDescriptor> start_process(std::vector<int> inherited);
 
   const Assignment assignment_;
   const WorkerOptions options_;

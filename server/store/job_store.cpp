@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/unix_time.h"
 #include "server/store/schema.h"
 
 namespace radbake::store {
@@ -18,11 +19,6 @@ const char* const kColumns =
     "id, name, label, bake_key, manifest_sha256, manifest_size, settings, run, state, attempt, lost_attempts, "
     "last_sequence, error_code, error_message, created_unix_ms, finished_unix_ms, tenant, client, trace_id, priority, "
     "is_shared, is_from_store, failed_attempts, ";
-
-std::int64_t unix_ms_now() {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 // Tenants choose their request ids by themselves: equal ones do not meet. No tenant's name has a line's end.
 std::string scoped(const std::string& tenant, const std::string& request_id) {

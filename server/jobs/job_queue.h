@@ -34,7 +34,7 @@ struct QueueOptions {
   std::filesystem::path spool_folder;
   bool keeps_worker_ready = false;        ///< starts a worker ahead of need while nothing runs
   std::uint32_t max_running = 1;          ///< bakes at the same time
-  std::uint32_t max_queued = 1000;        ///< bakes that wait
+  std::uint32_t max_queued = 1000;        ///< bakes that wait, or share another's run
   std::uint32_t max_running_plans = 4;    ///< plans do not wait
   std::uint32_t max_lost_attempts = 5;    ///< a bake that takes the server down this often, without getting on, fails
   std::uint32_t max_failed_attempts = 3;  ///< and one whose worker dies this often
@@ -54,7 +54,7 @@ struct QueuePlace {
 
 /// How much there is to do.
 struct QueueStats {
-  std::uint64_t num_waiting = 0;
+  std::uint64_t num_waiting = 0;  ///< bakes without a worker of their own: they wait, or share another's run
   std::uint64_t num_running = 0;
   std::uint64_t num_plans = 0;  ///< that are being made
 };

@@ -9,8 +9,12 @@ namespace radbake::jobs {
 QueueStats JobQueue::stats() const {
   const std::lock_guard lock(mutex_);
   QueueStats stats;
-  for (const auto& [name, run] : runs_) ++(run->assignment().is_plan ? stats.num_plans : stats.num_running);
-  for (const auto& [name, job] : live_) stats.num_waiting += job->state() == store::JobState::kQueued;
+  std::uint64_t num_with_worker = 0;
+  for (const auto& [name, run] : runs_) {
+    ++(run->assignment().is_plan ? stats.num_plans : stats.num_running);
+    num_with_worker += live_.contains(name);
+  }
+  stats.num_waiting = live_.size() - num_with_worker;
   return stats;
 }
 

@@ -85,6 +85,7 @@ class FakeWorker {
       case kNameUnsentBlob: layer_.digest = digest_of(std::string("never sent")); return finish_bake();
       case kListDescriptors: return fail(grpc::INVALID_ARGUMENT, list_descriptors());
       case kSucceedSecondTime: return attempt_ == 1 ? run(true) : succeed();
+      case kDieAfterTiles: return attempt_ == 1 ? die_after_tiles() : succeed();
       case kReadInputs: return fail(grpc::INVALID_ARGUMENT, read_inputs());
       // What breaks out does not get to its outcome.
       case kStartProcess: fork(); return succeed();
@@ -110,7 +111,7 @@ class FakeWorker {
     report_progress(v1::FORM_FACTORS, 0.2);
     report_progress(v1::SOLVING, 0.4);
     report_progress(v1::GATHERING, 0.5);
-    const unsigned num_tiles = start_.settings().max_patches();
+    const auto num_tiles = static_cast<unsigned>(start_.settings().transport_memory_bytes());
     std::string plane;
     for (unsigned i = 0; i < num_tiles; ++i) plane += send_tile(i, num_tiles);
     report_progress(v1::WRITING, 0.9);
@@ -129,6 +130,16 @@ class FakeWorker {
     v1::WorkerReport report;
     report.mutable_cancelled()->set_code(grpc::CANCELLED);
     stream_.Write(report);
+  }
+
+  void die_after_tiles() {
+    const auto num_tiles = static_cast<unsigned>(start_.settings().transport_memory_bytes());
+    for (unsigned i = 0; i < num_tiles / 2; ++i) send_tile(i, num_tiles);
+    while (!is_finishing_) {
+      report_progress(v1::GATHERING, 0.5);
+      std::this_thread::sleep_for(10ms);
+    }
+    raise(SIGSEGV);
   }
 
   void report_progress(v1::BakeState state, double fraction) {

@@ -4,7 +4,7 @@ namespace radbake::testing {
 
 /// What the fake worker does: a test puts the number into BakeSettings.seed.
 enum FakeWork {
-  kSucceed = 1,             ///< all states, BakeSettings.max_patches tiles, one layer
+  kSucceed = 1,             ///< all states, BakeSettings.transport_memory_bytes tiles, one layer
   kFailBadScene = 2,        ///< reports INVALID_ARGUMENT
   kCrash = 3,               ///< ends by SIGSEGV in the middle
   kExitWithMessage = 4,     ///< writes a line to stderr and exits with code 7
@@ -16,7 +16,8 @@ enum FakeWork {
   kListDescriptors = 10,    ///< fails with the list of its open descriptors
   kSucceedSecondTime = 11,  ///< attempt 1 as kRunUntilCancelled, attempt 2 as kSucceed
   kReadInputs = 12,         ///< fails with the sum of the sizes of its inputs, read from their descriptors
-  kNearlyDone = 40,         ///< as kRunUntilCancelled, but says all the time that it is nearly done
+  kDieAfterTiles = 13,  ///< attempt 1 ends by SIGSEGV when it is told to finish, half its tiles sent; then as kSucceed
+  kNearlyDone = 40,     ///< as kRunUntilCancelled, but says all the time that it is nearly done
   // In the sandbox of real workers:
   kStartProcess = 30,  ///< forks
   kRunProgram = 31,    ///< executes /bin/true in its place

@@ -114,7 +114,7 @@ v1::SubmitBakeRequest TestClient::request_for(const v1::Digest& manifest, FakeWo
   *request.mutable_manifest() = manifest;
   request.mutable_settings()->set_atlas_size(64);
   request.mutable_settings()->set_seed(work);
-  request.mutable_settings()->set_max_patches(num_tiles);
+  request.mutable_settings()->set_transport_memory_bytes(num_tiles);
   request.set_label("box.glb");
   return request;
 }

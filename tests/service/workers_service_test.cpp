@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <thread>
 
 #include "tests/service/test_server.h"
 
@@ -93,7 +94,17 @@ TEST_F(WorkersServiceTest, FailsWhenTheWorkerCannotBeStarted) {
   options.queue.worker.program = folder.path() / "no-such-worker";
   TestServer server(options);
   TestClient client = server.client();
-  expect_failed(client.watch(client.submit(kSucceed).name()).finished(), grpc::INTERNAL, "no-such-worker");
+  const std::string name = client.submit(kSucceed).name();
+  const auto limit = std::chrono::steady_clock::now() + kCallLimit;
+  while (client.get(name).attempt() < 2 && std::chrono::steady_clock::now() < limit) std::this_thread::sleep_for(5ms);
+  std::filesystem::create_symlink(RADBAKE_FAKE_WORKER, options.queue.worker.program);
+  const auto watched = client.watch(name);
+  EXPECT_EQ(watched.finished().state(), v1::SUCCEEDED);
+  const auto events = watched.events();
+  const auto names_worker = [](const v1::BakeEvent& event) {
+    return event.message().find("no-such-worker") != std::string::npos;
+  };
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), names_worker));
 }
 
 TEST_F(WorkersServiceTest, RefusesAResultBlobThatDoesNotMatchItsDigest) {

@@ -111,6 +111,11 @@ Result<bool> WatchReactor::next_message() {
     return true;
   }
   const std::shared_ptr<jobs::TileSpool> tiles = request_.include_tiles() ? job_->tiles() : nullptr;
+  // Another attempt begins with its own first tile.
+  if (tiles != tiles_) {
+    tiles_ = tiles;
+    num_tiles_ = 0;
+  }
   if (tiles && num_tiles_ < tiles->num_tiles()) {
     RADBAKE_ASSIGN_OR_RETURN(const std::string tile, tiles->read(num_tiles_++));
     if (!response_.mutable_tile()->ParseFromString(tile)) return internal_error("a spooled tile is not readable");

@@ -59,7 +59,8 @@ class WatchReactor : public grpc::ServerWriteReactor<v1::WatchBakeResponse>,
   bool has_snapshot_ = false;
   std::uint64_t last_sequence_ = 0;
   std::uint64_t last_progress_ = 0;
-  std::size_t num_tiles_ = 0;
+  std::shared_ptr<jobs::TileSpool> tiles_;  // of the attempt that it sees
+  std::size_t num_tiles_ = 0;               // of these
 };
 
 }  // namespace radbake::service

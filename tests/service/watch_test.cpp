@@ -70,6 +70,27 @@ TEST_F(WatchTest, GivesEachOfTwoWatchersEveryTile) {
   }
 }
 
+TEST_F(WatchTest, ShowsTheTilesOfANewAttemptFromTheFirstOn) {
+  constexpr unsigned kTiles = 4;
+  v1::WatchBakeRequest request;
+  request.set_name(client_.submit(kDieAfterTiles, kTiles).name());
+  request.set_include_tiles(true);
+  const auto context = new_context();
+  const auto stream = client_.bakes->WatchBake(context.get(), request);
+  std::vector<unsigned> tiles;
+  v1::WatchBakeResponse message;
+  while (stream->Read(&message)) {
+    if (!message.has_tile()) continue;
+    tiles.push_back(message.tile().y() / kTileSize);
+    // All of the first attempt have been seen: now it may die.
+    if (tiles.size() != kTiles / 2) continue;
+    EXPECT_TRUE(client_.finish(request.name()).ok());
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_EQ(message.finished().state(), v1::SUCCEEDED);
+  EXPECT_EQ(tiles, (std::vector<unsigned>{0, 1, 0, 1, 2, 3}));
+}
+
 TEST_F(WatchTest, SendsNoTilesUnlessAsked) {
   EXPECT_TRUE(client_.watch(client_.submit(kSucceed).name()).tiles().empty());
 }

@@ -119,7 +119,7 @@ void BakeServer::make_services() {
   DiskWatchOptions disk = options_.disk;
   disk.problem = [queue = queue_.get()] { return queue->standstill(); };
   disk_ = std::make_unique<DiskWatch>(std::move(disk), readiness_);
-  workers_service_ = std::make_unique<WorkersService>(*queue_, *pool_, *costs_, metrics_, limits);
+  workers_service_ = std::make_unique<WorkersService>(*queue_, *costs_, metrics_, limits);
   content_service_ = std::make_unique<ContentService>(*gate_, *content_, *pool_, *disk_, limits);
   bakes_service_ =
       std::make_unique<BakesService>(*gate_, *queue_, *content_, *pool_, *disk_, limits, options_.max_threads);

@@ -7,11 +7,17 @@
 #include "server/service/report_reactor.h"
 
 namespace radbake::service {
+namespace {
+
+// Workers are ours: this keeps a broken one from the server's memory, and lets the report of any scene through.
+constexpr int kMaxReportBytes = 64 << 20;
+
+}  // namespace
 
 Result<void> WorkersService::start() {
   grpc::ServerBuilder builder;
   builder.RegisterService(this);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(limits_.max_message_bytes));
+  builder.SetMaxReceiveMessageSize(kMaxReportBytes);
   server_ = builder.BuildAndStart();
   if (!server_) return internal_error("the gRPC server for workers does not start");
   return {};

@@ -18,8 +18,8 @@ namespace radbake::service {
 /// can reach it.
 class WorkersService : public v1::Workers::CallbackService, public jobs::WorkerGate {
  public:
-  WorkersService(jobs::JobQueue& queue, store::TaskPool& pool, CostFile& costs, Metrics& metrics, const Limits& limits)
-      : queue_(queue), pool_(pool), costs_(costs), metrics_(metrics), limits_(limits) {}
+  WorkersService(jobs::JobQueue& queue, CostFile& costs, Metrics& metrics, const Limits& limits)
+      : queue_(queue), costs_(costs), metrics_(metrics), limits_(limits) {}
 
   Result<void> start();
   void stop();
@@ -28,11 +28,14 @@ class WorkersService : public v1::Workers::CallbackService, public jobs::WorkerG
   grpc::ServerBidiReactor<v1::WorkerReport, v1::WorkerCommand>* Report(grpc::CallbackServerContext* context) override;
 
  private:
+  static constexpr int kPoolThreads = 2;
+
   jobs::JobQueue& queue_;
-  store::TaskPool& pool_;
   CostFile& costs_;
   Metrics& metrics_;
   const Limits limits_;
+  // Of its own: a worker whose reports wait behind uploads looks silent, and is killed for it.
+  store::TaskPool pool_{kPoolThreads};
   std::unique_ptr<grpc::Server> server_;
 };
 

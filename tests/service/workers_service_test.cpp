@@ -88,7 +88,7 @@ TEST_F(WorkersServiceTest, StopsAWorkerThatNeverConnects) {
   expect_failed(bake_with(kMuteName), grpc::INTERNAL, "gave no sign of life for 1 s");
 }
 
-TEST_F(WorkersServiceTest, FailsWhenTheWorkerCannotBeStarted) {
+TEST_F(WorkersServiceTest, WaitsWhileTheWorkerCannotBeStarted) {
   TemporaryFolder folder;
   service::BakeServerOptions options = options_in(folder.path());
   options.queue.worker.program = folder.path() / "no-such-worker";
@@ -114,6 +114,16 @@ TEST_F(WorkersServiceTest, RefusesAResultBlobThatDoesNotMatchItsDigest) {
 
 TEST_F(WorkersServiceTest, RefusesAResultThatNamesABlobNeverSent) {
   expect_failed(bake(kNameUnsentBlob), grpc::INTERNAL, "never sent");
+}
+
+TEST_F(WorkersServiceTest, TakesFromWorkersMoreThanFromClients) {
+  TemporaryFolder folder;
+  service::BakeServerOptions options = options_in(folder.path());
+  options.limits.max_message_bytes = 64 << 10;
+  TestServer server(options);
+  TestClient client = server.client();
+  // 128 tiles are a chunk of 128 KiB.
+  EXPECT_EQ(client.watch(client.submit(kSucceed, 128).name()).finished().state(), v1::SUCCEEDED);
 }
 
 TEST_F(WorkersServiceTest, HandsDownOneSocketAndTheInputsAndNothingElse) {

@@ -94,7 +94,6 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
     return bad_field("label",
                      std::to_string(request.label().size()) + " bytes are above " + std::to_string(kMaxLabelBytes));
   }
-  // A request that was accepted once is answered as it was, whatever became of its blobs and of the queue.
   if (request.priority() < -kMaxPriority || request.priority() > kMaxPriority) {
     return bad_field("priority", std::to_string(request.priority()) + " is not between -100 and 100");
   }
@@ -102,12 +101,13 @@ grpc::Status BakesService::admit(const v1::SubmitBakeRequest& request, store::Ne
   job.owner.is_shared = !request.no_cache();
   job.request_id = request.request_id();
   job.body_sha256 = digest_of(request.SerializeAsString()).sha256;
+  // A request that was accepted once is answered as it was, whatever became of its blobs and of the queue.
   const auto found = queue_.find_request(job.owner.tenant, job.request_id, job.body_sha256);
   if (!found.ok()) return to_status(found.error());
   known = *found;
   if (known) return grpc::Status::OK;
   if (auto room = disk_.admit(); !room.ok() && !request.validate_only()) {
-    return to_status(room.error(), "min_free_disk_bytes");
+    return to_status(room.error());
   }
 
   const SceneRequest scene{request.manifest(), request.settings(), request.run()};

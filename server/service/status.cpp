@@ -7,6 +7,7 @@
 #include "common/base/shortened.h"
 #include "common/base/version.h"
 #include "google/rpc/error_details.pb.h"
+#include "radbake/v1/server.pb.h"
 
 namespace radbake::service {
 namespace {
@@ -41,6 +42,17 @@ grpc::Status with_details(grpc::StatusCode code, const std::string& message, con
   return {code, message, status.SerializeAsString()};
 }
 
+bool names(const Error& error, const std::string& limit) { return error.message.find(limit) != std::string::npos; }
+
+/// The limit that an error names, else `otherwise`.
+std::string limit_of(const Error& error, const std::string& otherwise) {
+  const auto* limits = v1::Limits::descriptor();
+  for (int i = 0; i < limits->field_count(); ++i) {
+    if (names(error, limits->field(i)->name())) return limits->field(i)->name();
+  }
+  return otherwise;
+}
+
 google::rpc::QuotaFailure quota_failure(const std::string& limit, const std::string& message) {
   google::rpc::QuotaFailure quota;
   auto* violation = quota.add_violations();
@@ -59,7 +71,8 @@ google::rpc::RetryInfo retry_soon() {
 
 grpc::Status to_status(const Error& error, const std::string& limit) {
   if (error.code == ErrorCode::kResourceExhausted) {
-    return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, error.message, quota_failure(limit, error.message));
+    return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, error.message,
+                        quota_failure(limit_of(error, limit), error.message));
   }
   if (error.code == ErrorCode::kUnavailable) {
     return with_details(grpc::StatusCode::UNAVAILABLE, error.message, retry_soon());
@@ -100,7 +113,7 @@ grpc::Status busy(const std::string& limit, std::uint64_t bound) {
 }
 
 grpc::Status busy(const Error& error, const std::string& limit) {
-  if (error.code != ErrorCode::kResourceExhausted) return to_status(error, limit);
+  if (error.code != ErrorCode::kResourceExhausted || !names(error, limit)) return to_status(error, kDiskLimit);
   return with_details(grpc::StatusCode::RESOURCE_EXHAUSTED, error.message, quota_failure(limit, error.message),
                       retry_soon());
 }

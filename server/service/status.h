@@ -13,8 +13,11 @@ namespace radbake::service {
 
 // Errors as the wire knows them: a gRPC status whose details (google.rpc.*) programs can read.
 
-/// The status of an error. Above a limit it carries QuotaFailure with the limit's name as subject, where the server
-/// cannot serve now it carries RetryInfo.
+/// What kResourceExhausted is about where the error names no limit: the disk is full to the last byte.
+inline constexpr char kDiskLimit[] = "min_free_disk_bytes";
+
+/// The status of an error. Above a limit it carries QuotaFailure, whose subject is the limit that the error's message
+/// names, else `limit`; where the server cannot serve now it carries RetryInfo.
 grpc::Status to_status(const Error& error, const std::string& limit = "");
 
 /// FAILED_PRECONDITION with a PreconditionFailure MISSING for the first blobs of the list.
@@ -28,7 +31,7 @@ grpc::Status above_limit(const std::string& limit, std::uint64_t value, std::uin
 
 /// RESOURCE_EXHAUSTED as above, for a limit on what goes on at the same time: with RetryInfo, as it frees up by itself.
 grpc::Status busy(const std::string& limit, std::uint64_t bound);
-/// The same of an error; of any other than kResourceExhausted as to_status().
+/// The same of an error that names `limit`; of any other as to_status(), which is told that the disk is full.
 grpc::Status busy(const Error& error, const std::string& limit);
 
 /// OK unless the caller says (metadata radbake-protocol) that it speaks another major version than ours.

@@ -58,7 +58,7 @@ std::optional<grpc::Status> UploadReactor::take_chunk() {
       return grpc::Status::OK;
     }
   }
-  if (auto room = disk_.admit(); !room.ok()) return to_status(room.error(), "min_free_disk_bytes");
+  if (auto room = disk_.admit(); !room.ok()) return to_status(room.error());
   if (chunk_.data().size() > limits_.chunk_bytes) {
     return above_limit("chunk_bytes", chunk_.data().size(), limits_.chunk_bytes);
   }
@@ -73,13 +73,13 @@ std::optional<grpc::Status> UploadReactor::take_chunk() {
     if (committed.error().code == ErrorCode::kFailedPrecondition) {
       return grpc::Status(grpc::StatusCode::OUT_OF_RANGE, committed.error().message);
     }
-    return to_status(committed.error(), "max_blob_bytes");
+    return to_status(committed.error(), kDiskLimit);
   }
   next_offset_ += chunk_.data().size();
   result_.set_committed_bytes(*committed);
   if (!chunk_.finish()) return std::nullopt;
   if (auto finished = store_->finish_upload(*digest_); !finished.ok()) {
-    return to_status(finished.error(), "max_blob_bytes");
+    return to_status(finished.error(), kDiskLimit);
   }
   result_.set_committed_bytes(digest_->size_bytes);
   return grpc::Status::OK;

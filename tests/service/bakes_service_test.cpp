@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <limits>
 #include <set>
 #include <thread>
@@ -8,6 +9,7 @@
 #include "common/base/version.h"
 #include "google/rpc/error_details.pb.h"
 #include "radbake/v1/scene.pb.h"
+#include "server/store/failpoint.h"
 #include "tests/service/test_server.h"
 
 namespace radbake::testing {
@@ -238,6 +240,16 @@ TEST_F(BakesServiceTest, RefusesABakeThatTheQueueHasNoRoomFor) {
   EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
   EXPECT_EQ(detail_of<google::rpc::QuotaFailure>(status)->violations(0).subject(), "max_queued_bakes");
   EXPECT_TRUE(detail_of<google::rpc::RetryInfo>(status).has_value());
+}
+
+TEST_F(BakesServiceTest, SaysThatTheDiskIsFullWhereTheDatabaseHasNoRoom) {
+  const v1::SubmitBakeRequest request = client_.request_for(client_.upload_scene(), kSucceed);
+  store::fault_hook = [](const char* operation) { return operation == std::string("commit") ? ENOSPC : 0; };
+  const grpc::Status status = submit(request);
+  store::fault_hook = nullptr;
+  EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(detail_of<google::rpc::QuotaFailure>(status)->violations(0).subject(), "min_free_disk_bytes");
+  EXPECT_FALSE(detail_of<google::rpc::RetryInfo>(status).has_value());
 }
 
 TEST_F(BakesServiceTest, CancelsAQueuedBakeAtOnce) {

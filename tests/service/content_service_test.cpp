@@ -7,6 +7,12 @@
 namespace radbake::testing {
 namespace {
 
+/// The limit that a refusal names.
+std::string limit_of(const grpc::Status& status) {
+  const auto quota = detail_of<google::rpc::QuotaFailure>(status);
+  return quota ? quota->violations(0).subject() : "";
+}
+
 class ContentServiceTest : public ::testing::Test {
  protected:
   std::string download(const std::string& bytes, std::uint64_t offset, std::uint64_t limit) {
@@ -149,6 +155,15 @@ TEST_F(ContentServiceTest, RefusesABlobAboveTheLimitBeforeItsFirstByte) {
   const grpc::Status status = finish_upload(*stream);
   EXPECT_EQ(status.error_code(), grpc::RESOURCE_EXHAUSTED);
   EXPECT_THAT(status.error_message(), ::testing::HasSubstr("max_blob_bytes"));
+  EXPECT_EQ(limit_of(status), "max_blob_bytes");
+}
+
+TEST_F(ContentServiceTest, NamesTheLimitThatABlobDoesNotFitInto) {
+  TemporaryFolder folder;
+  service::BakeServerOptions options = TestServer::options_in(folder.path());
+  options.limits.max_content_bytes = 1000;
+  TestServer server(options);
+  EXPECT_EQ(limit_of(server.client().upload(blob_)), "max_content_bytes");
 }
 
 TEST_F(ContentServiceTest, RefusesANameThatIsNotADigest) {

@@ -120,10 +120,11 @@ void BakeServer::make_services() {
   disk.problem = [queue = queue_.get()] { return queue->standstill(); };
   disk_ = std::make_unique<DiskWatch>(std::move(disk), readiness_);
   workers_service_ = std::make_unique<WorkersService>(*queue_, *costs_, metrics_, limits);
-  content_service_ = std::make_unique<ContentService>(*gate_, *content_, *pool_, *disk_, limits);
+  calls_ = std::make_unique<UnaryCalls>(*gate_, *pool_);
+  content_service_ = std::make_unique<ContentService>(*gate_, *calls_, *content_, *pool_, *disk_, limits);
   bakes_service_ =
-      std::make_unique<BakesService>(*gate_, *queue_, *content_, *pool_, *disk_, limits, options_.max_threads);
-  server_service_ = std::make_unique<ServerService>(*gate_, *pool_, limits);
+      std::make_unique<BakesService>(*gate_, *calls_, *queue_, *content_, *pool_, *disk_, limits, options_.max_threads);
+  server_service_ = std::make_unique<ServerService>(*calls_, limits);
   has_parts_ = true;
 }
 

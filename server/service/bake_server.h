@@ -23,6 +23,7 @@
 #include "server/service/metrics.h"
 #include "server/service/readiness.h"
 #include "server/service/server_service.h"
+#include "server/service/unary_calls.h"
 #include "server/service/workers_service.h"
 #include "server/store/job_store.h"
 #include "server/store/task_pool.h"
@@ -86,6 +87,7 @@ class BakeServer {
   std::unique_ptr<store::TaskPool> pool_;
   std::unique_ptr<CostFile> costs_;
   std::unique_ptr<Gate> gate_;
+  std::unique_ptr<UnaryCalls> calls_;
   std::unique_ptr<WorkersService> workers_service_;
   std::unique_ptr<ContentService> content_service_;
   std::unique_ptr<BakesService> bakes_service_;

@@ -7,7 +7,6 @@
 #include "server/service/plan_reactor.h"
 #include "server/service/rpc_watch.h"
 #include "server/service/status.h"
-#include "server/service/unary_call.h"
 #include "server/service/visible_job.h"
 #include "server/service/watch_reactor.h"
 
@@ -50,7 +49,7 @@ void set_place(const jobs::QueuePlace& place, v1::Bake& bake) {
 grpc::ServerUnaryReactor* BakesService::SubmitBake(grpc::CallbackServerContext* context,
                                                    const v1::SubmitBakeRequest* request, v1::Bake* bake) {
   if (request->validate_only()) return validate(context, *request, *bake);
-  return answer_on_pool(pool_, gate_, context, [this, context, request, bake](const access::Caller& caller) {
+  return calls_.answer(context, [this, context, request, bake](const access::Caller& caller) {
     return submit(owner_of(caller, *context), *request, *bake);
   });
 }
@@ -66,13 +65,11 @@ grpc::Status BakesService::submit(const store::JobOwner& owner, const v1::Submit
 grpc::ServerUnaryReactor* BakesService::validate(grpc::CallbackServerContext* context,
                                                  const v1::SubmitBakeRequest& request, v1::Bake& bake) {
   auto* reactor = new PlanReactor(queue_, bake.mutable_plan());
-  pool_.post([this, context, &request, &bake, reactor] {
+  calls_.run(context, reactor, [this, context, &request, &bake, reactor](const access::Caller& caller) {
     store::NewJob job;
     std::shared_ptr<jobs::Job> known;
-    const Admission admission = gate_.admit(*context);
-    job.owner = owner_of(admission.caller, *context);
-    grpc::Status status = admission.status;
-    if (status.ok()) status = admit(request, job, known);
+    job.owner = owner_of(caller, *context);
+    const grpc::Status status = admit(request, job, known);
     if (status.ok()) {
       bake.set_label(job.label);
       bake.set_bake_key(job.bake_key);
@@ -126,12 +123,10 @@ grpc::Status BakesService::check(const SceneRequest& scene, const std::string& t
 grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* context,
                                                  const v1::PlanBakeRequest* request, v1::Plan* plan) {
   auto* reactor = new PlanReactor(queue_, plan);
-  pool_.post([this, context, request, reactor] {
+  calls_.run(context, reactor, [this, context, request, reactor](const access::Caller& caller) {
     store::Work work;
-    const Admission admission = gate_.admit(*context);
-    const store::JobOwner owner = owner_of(admission.caller, *context);
-    grpc::Status status = admission.status;
-    if (status.ok()) status = check({request->manifest(), request->settings(), request->run()}, owner.tenant, work);
+    const store::JobOwner owner = owner_of(caller, *context);
+    const grpc::Status status = check({request->manifest(), request->settings(), request->run()}, owner.tenant, work);
     reactor->begin(status, owner, work);
   });
   return reactor;
@@ -139,8 +134,8 @@ grpc::ServerUnaryReactor* BakesService::PlanBake(grpc::CallbackServerContext* co
 
 grpc::ServerUnaryReactor* BakesService::GetBake(grpc::CallbackServerContext* context, const v1::GetBakeRequest* request,
                                                 v1::Bake* bake) {
-  return answer_on_pool(pool_, gate_, context,
-                        [this, request, bake](const access::Caller& caller) { return get(caller, *request, *bake); });
+  return calls_.answer(context,
+                       [this, request, bake](const access::Caller& caller) { return get(caller, *request, *bake); });
 }
 
 grpc::Status BakesService::get(const access::Caller& caller, const v1::GetBakeRequest& request, v1::Bake& bake) {
@@ -151,7 +146,7 @@ grpc::Status BakesService::get(const access::Caller& caller, const v1::GetBakeRe
 
 grpc::ServerUnaryReactor* BakesService::CancelBake(grpc::CallbackServerContext* context,
                                                    const v1::CancelBakeRequest* request, v1::Bake* bake) {
-  return answer_on_pool(pool_, gate_, context, [this, request, bake](const access::Caller& caller) {
+  return calls_.answer(context, [this, request, bake](const access::Caller& caller) {
     const auto visible = find_visible(queue_, caller, request->name());
     return reply(visible.ok() ? queue_.cancel(request->name()) : visible, *bake);
   });
@@ -159,7 +154,7 @@ grpc::ServerUnaryReactor* BakesService::CancelBake(grpc::CallbackServerContext* 
 
 grpc::ServerUnaryReactor* BakesService::FinishBake(grpc::CallbackServerContext* context,
                                                    const v1::FinishBakeRequest* request, v1::Bake* bake) {
-  return answer_on_pool(pool_, gate_, context, [this, request, bake](const access::Caller& caller) {
+  return calls_.answer(context, [this, request, bake](const access::Caller& caller) {
     const auto visible = find_visible(queue_, caller, request->name());
     return reply(visible.ok() ? queue_.finish(request->name()) : visible, *bake);
   });
@@ -168,9 +163,8 @@ grpc::ServerUnaryReactor* BakesService::FinishBake(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* BakesService::ListBakes(grpc::CallbackServerContext* context,
                                                   const v1::ListBakesRequest* request,
                                                   v1::ListBakesResponse* response) {
-  return answer_on_pool(pool_, gate_, context, [this, request, response](const access::Caller& caller) {
-    return list(caller, *request, *response);
-  });
+  return calls_.answer(
+      context, [this, request, response](const access::Caller& caller) { return list(caller, *request, *response); });
 }
 
 grpc::Status BakesService::list(const access::Caller& caller, const v1::ListBakesRequest& request,

@@ -7,6 +7,7 @@
 #include "server/service/disk_watch.h"
 #include "server/service/gate.h"
 #include "server/service/scene_check.h"
+#include "server/service/unary_calls.h"
 #include "server/store/task_pool.h"
 #include "server/store/tenant_content.h"
 
@@ -16,9 +17,10 @@ namespace radbake::service {
 class BakesService : public v1::Bakes::CallbackService {
  public:
   /// max_threads: of a bake; 0: as many as it asks for.
-  BakesService(const Gate& gate, jobs::JobQueue& queue, store::TenantContent& content, store::TaskPool& pool,
-               const DiskWatch& disk, const Limits& limits, std::uint32_t max_threads)
+  BakesService(const Gate& gate, UnaryCalls& calls, jobs::JobQueue& queue, store::TenantContent& content,
+               store::TaskPool& pool, const DiskWatch& disk, const Limits& limits, std::uint32_t max_threads)
       : gate_(gate),
+        calls_(calls),
         queue_(queue),
         content_(content),
         pool_(pool),
@@ -55,6 +57,7 @@ class BakesService : public v1::Bakes::CallbackService {
   grpc::Status list(const access::Caller& caller, const v1::ListBakesRequest& request, v1::ListBakesResponse& response);
 
   const Gate& gate_;
+  UnaryCalls& calls_;
   jobs::JobQueue& queue_;
   store::TenantContent& content_;
   store::TaskPool& pool_;

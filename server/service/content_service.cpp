@@ -5,7 +5,6 @@
 #include "server/service/convert.h"
 #include "server/service/download_reactor.h"
 #include "server/service/status.h"
-#include "server/service/unary_call.h"
 #include "server/service/upload_reactor.h"
 
 namespace radbake::service {
@@ -13,7 +12,7 @@ namespace radbake::service {
 grpc::ServerUnaryReactor* ContentService::FindMissing(grpc::CallbackServerContext* context,
                                                       const v1::FindMissingRequest* request,
                                                       v1::FindMissingResponse* response) {
-  return answer_on_pool(pool_, gate_, context, [this, request, response](const access::Caller& caller) {
+  return calls_.answer(context, [this, request, response](const access::Caller& caller) {
     return find_missing(caller, *request, *response);
   });
 }
@@ -47,7 +46,7 @@ grpc::ServerBidiReactor<v1::UploadChunk, v1::UploadResult>* ContentService::Uplo
 grpc::ServerUnaryReactor* ContentService::QueryUpload(grpc::CallbackServerContext* context,
                                                       const v1::QueryUploadRequest* request,
                                                       v1::QueryUploadResponse* response) {
-  return answer_on_pool(pool_, gate_, context, [this, request, response](const access::Caller& caller) {
+  return calls_.answer(context, [this, request, response](const access::Caller& caller) {
     return query_upload(caller, *request, *response);
   });
 }

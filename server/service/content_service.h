@@ -5,6 +5,7 @@
 #include "server/service/call_slots.h"
 #include "server/service/disk_watch.h"
 #include "server/service/gate.h"
+#include "server/service/unary_calls.h"
 #include "server/store/task_pool.h"
 #include "server/store/tenant_content.h"
 
@@ -14,9 +15,10 @@ namespace radbake::service {
 /// runs on the pool.
 class ContentService : public v1::Content::CallbackService {
  public:
-  ContentService(const Gate& gate, store::TenantContent& content, store::TaskPool& pool, const DiskWatch& disk,
-                 const Limits& limits)
+  ContentService(const Gate& gate, UnaryCalls& calls, store::TenantContent& content, store::TaskPool& pool,
+                 const DiskWatch& disk, const Limits& limits)
       : gate_(gate),
+        calls_(calls),
         content_(content),
         pool_(pool),
         disk_(disk),
@@ -39,6 +41,7 @@ class ContentService : public v1::Content::CallbackService {
                             v1::QueryUploadResponse& response);
 
   const Gate& gate_;
+  UnaryCalls& calls_;
   store::TenantContent& content_;
   store::TaskPool& pool_;
   const DiskWatch& disk_;

@@ -3,15 +3,13 @@
 #include <thread>
 
 #include "common/base/version.h"
-#include "server/service/unary_call.h"
 
 namespace radbake::service {
 
 grpc::ServerUnaryReactor* ServerService::GetCapabilities(grpc::CallbackServerContext* context,
                                                          const v1::GetCapabilitiesRequest*,
                                                          v1::Capabilities* capabilities) {
-  return answer_on_pool(pool_, gate_, context,
-                        [this, capabilities](const access::Caller&) { return describe(*capabilities); });
+  return calls_.answer(context, [this, capabilities](const access::Caller&) { return describe(*capabilities); });
 }
 
 grpc::Status ServerService::describe(v1::Capabilities& capabilities) const {

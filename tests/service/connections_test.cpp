@@ -3,10 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
+#include <list>
+#include <memory>
+#include <string_view>
 #include <thread>
 
 #include "common/base/digest.h"
 #include "google/rpc/error_details.pb.h"
+#include "server/store/failpoint.h"
 #include "tests/service/test_certificates.h"
 #include "tests/service/test_server.h"
 
@@ -15,6 +21,55 @@ namespace {
 
 const std::string kTokens[] = {"first.token.which.is.long.enough.", "second.token.which.is.long.enough",
                                "third.token.which.is.long.enough."};
+
+/// While there is one, bakes wait to be recorded, and the threads that answer calls for them.
+class BusyServer {
+ public:
+  /// More than the server's threads.
+  static constexpr int kSubmits = 6;
+
+  explicit BusyServer(TestClient client) : client_(std::move(client)) {
+    const v1::Digest scene = client_.upload_scene();
+    is_held_ = true;
+    store::failpoint_hook = [](const char* name) {
+      while (is_held_ && name == std::string_view("database.changed")) std::this_thread::yield();
+    };
+    for (int i = 0; i < kSubmits; ++i) {
+      submits_.emplace_back([this, scene] {
+        v1::Bake bake;
+        const auto request = client_.request_for(scene, kSucceed);
+        EXPECT_TRUE(client_.bakes->SubmitBake(new_context().get(), request, &bake).ok());
+      });
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  ~BusyServer() {
+    is_held_ = false;
+    for (std::thread& submit : submits_) submit.join();
+    store::failpoint_hook = nullptr;
+  }
+
+ private:
+  static inline std::atomic<bool> is_held_ = false;
+  TestClient client_;
+  std::vector<std::thread> submits_;
+};
+
+/// A call that nobody waits for yet.
+struct OpenCall {
+  explicit OpenCall(const TestClient& client) {
+    client.server->async()->GetCapabilities(context.get(), &request, &capabilities, [this](const grpc::Status& is) {
+      status = is;
+      has_ended = true;
+      has_ended.notify_one();
+    });
+  }
+  std::unique_ptr<grpc::ClientContext> context = new_context();
+  v1::GetCapabilitiesRequest request;
+  v1::Capabilities capabilities;
+  grpc::Status status;
+  std::atomic<bool> has_ended = false;
+};
 
 class ConnectionsTest : public ::testing::Test {
  protected:
@@ -79,6 +134,47 @@ class ConnectionsTest : public ::testing::Test {
   TemporaryFolder folder_;
   std::unique_ptr<TestServer> server_;
 };
+
+TEST_F(ConnectionsTest, TurnsStrangersAwayThoughTheServerIsBusy) {
+  start({});
+  const BusyServer busy(client());
+  v1::Capabilities capabilities;
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(5));
+  EXPECT_EQ(server_->client().server->GetCapabilities(&context, {}, &capabilities).error_code(), grpc::UNAUTHENTICATED);
+}
+
+TEST_F(ConnectionsTest, BoundsTheCallsOfATenantThatWait) {
+  constexpr int kConnections = 4, kCalls = 150, kMostWaiting = 512;
+  start({});
+  auto busy = std::make_unique<BusyServer>(client(0));
+  std::list<TestClient> clients;
+  std::list<OpenCall> calls;
+  for (int i = 0; i < kConnections; ++i) {
+    clients.push_back(client(0));
+    for (int k = 0; k < kCalls; ++k) calls.emplace_back(clients.back());
+  }
+  OpenCall other(client(1));
+  // Those above the limit are refused although nothing is answered yet.
+  constexpr int kAbove = kConnections * kCalls - kMostWaiting;
+  const auto has_ended = [](const OpenCall& call) { return call.has_ended.load(); };
+  const auto limit = std::chrono::steady_clock::now() + kCallLimit;
+  while (std::count_if(calls.begin(), calls.end(), has_ended) < kAbove && std::chrono::steady_clock::now() < limit) {
+    std::this_thread::yield();
+  }
+  busy.reset();
+  int num_refused = 0;
+  for (OpenCall& call : calls) {
+    call.has_ended.wait(false);
+    if (call.status.ok()) continue;
+    ++num_refused;
+    expect_busy(call.status, "max_waiting_calls_per_tenant");
+  }
+  EXPECT_GT(num_refused, 0);
+  EXPECT_LE(num_refused, kAbove + BusyServer::kSubmits);
+  other.has_ended.wait(false);
+  EXPECT_TRUE(other.status.ok()) << "one tenant's calls are no other's";
+}
 
 TEST_F(ConnectionsTest, BoundsTheUploadsOfATenantAndOfAll) {
   Limits limits;

@@ -3,14 +3,12 @@
 #include <netdb.h>
 #include <netinet/in.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
 #include <cstring>
 #include <memory>
-#include <string_view>
 
 namespace radbake::access {
 namespace {
@@ -18,22 +16,31 @@ namespace {
 constexpr std::string_view kUnixScheme = "unix:";
 constexpr int kMaxWaiting = 512;
 
-bool is_loopback(const sockaddr_storage& address) {
-  if (address.ss_family == AF_INET) {
+bool is_loopback(const sockaddr& address) {
+  if (address.sa_family == AF_INET) {
     return ntohl(reinterpret_cast<const sockaddr_in&>(address).sin_addr.s_addr) >> 24 == IN_LOOPBACKNET;
   }
-  return address.ss_family == AF_INET6 &&
+  return address.sa_family == AF_INET6 &&
          IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<const sockaddr_in6&>(address).sin6_addr) != 0;
 }
 
-Result<ListenAddress> resolve_path(const std::string& text) {
-  const std::string path = text.substr(kUnixScheme.size());
+using Addresses = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
+
+/// flags: AI_NUMERICHOST to ask nobody. Returns what getaddrinfo() does.
+int find_addresses(const AddressText& text, int flags, Addresses& addresses) {
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV | flags;
+  addrinfo* found = nullptr;
+  const int failure = ::getaddrinfo(text.host.c_str(), std::to_string(text.port).c_str(), &hints, &found);
+  addresses.reset(found);
+  return failure;
+}
+
+ListenAddress address_of_path(const std::string& text, const std::string& path) {
   ListenAddress address{text, std::vector<ListenAddress::Socket>(1), true};
   auto& to = reinterpret_cast<sockaddr_un&>(address.sockets.front().address);
-  if (path.empty() || path.size() >= sizeof to.sun_path) {
-    return invalid_argument("--listen " + text + ": the path must have 1 to " + std::to_string(sizeof to.sun_path - 1) +
-                            " bytes, not " + std::to_string(path.size()));
-  }
   to.sun_family = AF_UNIX;
   std::memcpy(to.sun_path, path.c_str(), path.size() + 1);
   address.sockets.front().size = sizeof to;
@@ -78,39 +85,53 @@ int try_listening(const ListenAddress::Socket& socket, store::FileDescriptor& li
 
 }  // namespace
 
-Result<ListenAddress> resolve_listen_address(const std::string& text) {
-  if (text.starts_with(kUnixScheme)) return resolve_path(text);
-  const auto wrong = [&] {
-    return invalid_argument("--listen '" + text + "': expected HOST:PORT with a port of 0 to 65535, or unix:PATH");
-  };
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0) return wrong();
-  std::string host = text.substr(0, colon);
-  if (host.starts_with('[') && host.ends_with(']')) {
-    host = host.substr(1, host.size() - 2);
-  } else if (host.find(':') != std::string::npos) {
-    return wrong();
+std::optional<AddressText> read_address(std::string_view text) {
+  AddressText address;
+  if (text.starts_with(kUnixScheme)) {
+    address.path = text.substr(kUnixScheme.size());
+    if (address.path.empty() || address.path.size() > kMaxSocketPathBytes) return std::nullopt;
+    return address;
   }
-  const std::string port = text.substr(colon + 1);
-  std::uint16_t number = 0;
-  const auto [end, problem] = std::from_chars(port.data(), port.data() + port.size(), number);
-  if (problem != std::errc() || end != port.data() + port.size()) return wrong();
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) return std::nullopt;
+  std::string_view host = text.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
+  } else if (host.find_first_of(":[] /") != std::string_view::npos) {
+    return std::nullopt;
+  }
+  address.host = host;
+  const std::string_view port = text.substr(colon + 1);
+  const auto [end, problem] = std::from_chars(port.data(), port.data() + port.size(), address.port);
+  if (problem != std::errc() || end != port.data() + port.size()) return std::nullopt;
+  return address;
+}
 
-  addrinfo hints{};
-  hints.ai_family = AF_UNSPEC;
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  if (const int failure = ::getaddrinfo(host.c_str(), port.c_str(), &hints, &found); failure != 0) {
+std::optional<bool> is_local(const AddressText& address) {
+  if (!address.path.empty() || address.host == "localhost") return true;
+  Addresses found(nullptr, &::freeaddrinfo);
+  if (find_addresses(address, AI_NUMERICHOST, found) != 0) return std::nullopt;
+  return is_loopback(*found->ai_addr);
+}
+
+Result<ListenAddress> resolve_listen_address(const std::string& text) {
+  const auto parts = read_address(text);
+  if (!parts) {
+    return invalid_argument("--listen '" + text +
+                            "': expected HOST:PORT with a port of 0 to 65535, or unix:PATH with " +
+                            "a path of at most " + std::to_string(kMaxSocketPathBytes) + " bytes");
+  }
+  if (!parts->path.empty()) return address_of_path(text, parts->path);
+  Addresses addresses(nullptr, &::freeaddrinfo);
+  if (const int failure = find_addresses(*parts, 0, addresses); failure != 0) {
     return Error{ErrorCode::kUnavailable, "--listen '" + text + "': " + ::gai_strerror(failure)};
   }
-  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, &::freeaddrinfo);
   ListenAddress address{text, {}, true};
-  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+  for (const addrinfo* one = addresses.get(); one != nullptr; one = one->ai_next) {
     ListenAddress::Socket& socket = address.sockets.emplace_back();
     std::memcpy(&socket.address, one->ai_addr, one->ai_addrlen);
     socket.size = one->ai_addrlen;
-    address.is_local = address.is_local && is_loopback(socket.address);
+    address.is_local = address.is_local && is_loopback(*one->ai_addr);
   }
   return address;
 }

@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/service/config_values.h"
+#include "server/access/listen_address.h"
 
 namespace radbake::service {
 namespace {
@@ -59,9 +59,10 @@ Result<std::unique_ptr<AdminServer>> AdminServer::start(const std::string& addre
     answer.set_content(pages.metrics(), kPrometheusText);
   });
 
-  const std::string host = host_of(address), wanted = address.substr(address.rfind(':') + 1);
-  const int port = std::stoi(wanted);
-  const int bound = port == 0 ? server.bind_to_any_port(host) : server.bind_to_port(host, port) ? port : -1;
+  const auto parts = access::read_address(address);
+  int bound = -1;
+  if (parts && parts->port == 0) bound = server.bind_to_any_port(parts->host);
+  if (parts && parts->port != 0 && server.bind_to_port(parts->host, parts->port)) bound = parts->port;
   if (bound < 0) {
     return Error{ErrorCode::kUnavailable,
                  "admin-listen is '" + address + "': expected an address of this machine with a port that is free"};

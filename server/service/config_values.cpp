@@ -1,20 +1,15 @@
 #include "server/service/config_values.h"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <vector>
 
+#include "server/access/listen_address.h"
+
 namespace radbake::service {
 namespace {
 
-/// sockaddr_un::sun_path without its terminating zero.
-constexpr std::size_t kMaxSocketPath = 107;
-constexpr std::uint64_t kMaxPort = 65535;
-constexpr std::string_view kUnixPrefix = "unix:";
 /// 1024 to the power of a unit's place, from 1 on.
 constexpr std::string_view kUnits = "KMGT";
 
@@ -37,16 +32,6 @@ std::optional<std::uint64_t> read_bytes(std::string_view text) {
   const auto number = read_digits(text);
   if (!number || *number > (UINT64_MAX >> shift)) return std::nullopt;
   return *number << shift;
-}
-
-/// Where HOST ends in HOST:PORT. A host with colons stands in brackets.
-std::optional<std::size_t> port_colon(std::string_view address) {
-  const std::size_t colon = address.rfind(':');
-  if (colon == std::string_view::npos || colon == 0) return std::nullopt;
-  const std::string_view host = address.substr(0, colon);
-  const bool has_brackets = host.front() == '[' && host.back() == ']' && host.size() > 2;
-  if (!has_brackets && host.find_first_of(":[] /") != std::string_view::npos) return std::nullopt;
-  return colon;
 }
 
 std::string write_seconds(std::chrono::milliseconds time) {
@@ -125,37 +110,15 @@ ValueKind<std::filesystem::path> path_of(const std::string& what) {
 
 ValueKind<std::string> address(bool allows_unix) {
   const auto read = [allows_unix](const std::string& text) -> std::optional<std::string> {
-    if (text.starts_with(kUnixPrefix)) {
-      const std::size_t size = text.size() - kUnixPrefix.size();
-      return allows_unix && size > 0 && size <= kMaxSocketPath ? std::optional(text) : std::nullopt;
-    }
-    const auto colon = port_colon(text);
-    const auto port = colon ? read_digits(std::string_view(text).substr(*colon + 1)) : std::nullopt;
-    return port && *port <= kMaxPort ? std::optional(text) : std::nullopt;
+    const auto parts = access::read_address(text);
+    return parts && (allows_unix || parts->path.empty()) ? std::optional(text) : std::nullopt;
   };
   return {"ADDRESS",
           "HOST:PORT with a port from 0 (any free one) to 65535" +
-              (allows_unix ? ", or unix:PATH with a path of at most " + std::to_string(kMaxSocketPath) + " bytes"
-                           : std::string()),
+              (allows_unix
+                   ? ", or unix:PATH with a path of at most " + std::to_string(access::kMaxSocketPathBytes) + " bytes"
+                   : std::string()),
           read, [](const std::string& text) { return text; }};
-}
-
-std::string host_of(std::string_view address) {
-  const auto colon = port_colon(address);
-  std::string_view host = address.substr(0, colon.value_or(address.size()));
-  if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  return std::string(host);
-}
-
-bool is_local(std::string_view address) {
-  if (address.starts_with(kUnixPrefix)) return true;
-  const std::string host = host_of(address);
-  std::array<unsigned char, 16> bytes{};
-  if (inet_pton(AF_INET, host.c_str(), bytes.data()) == 1) return bytes[0] == 127;
-  if (inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1) {
-    return std::all_of(bytes.begin(), bytes.end() - 1, [](unsigned char byte) { return byte == 0; }) && bytes[15] == 1;
-  }
-  return host == "localhost";
 }
 
 }  // namespace radbake::service

@@ -7,7 +7,6 @@
 #include <initializer_list>
 #include <optional>
 #include <string>
-#include <string_view>
 
 namespace radbake::service {
 
@@ -35,10 +34,5 @@ ValueKind<std::string> address(bool allows_unix);
 
 /// As it is written: the largest unit that divides it. write_bytes(131072) is "128K".
 std::string write_bytes(std::uint64_t bytes);
-
-/// The host of HOST:PORT, without brackets.
-std::string host_of(std::string_view address);
-/// Whether only this machine can reach an address: unix:PATH, localhost, 127.0.0.0/8 or ::1.
-bool is_local(std::string_view address);
 
 }  // namespace radbake::service

@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "common/base/version.h"
+#include "server/access/access_options.h"
+#include "server/access/listen_address.h"
 #include "server/service/config_file.h"
 #include "server/service/config_values.h"
 
@@ -88,7 +90,7 @@ void declare_limits(OptionList& options, Limits& limits) {
   options.add("--max-atlas-size", limits.max_atlas_size, whole_number(1, 65'536), "Side of a lightmap at most, texels");
   options.add("--max-rays", limits.max_rays, whole_number(1, 1 << 30), "Rays of a texel");
   options.add("--max-patches", limits.max_patches, whole_number(1, 1'000'000'000), "Patches of a scene");
-  options.add("--max-queued-bakes", limits.max_queued_bakes, whole_number(0, 1'000'000),
+  options.add("--max-queued-bakes", limits.max_queued_bakes, whole_number(1, 1'000'000),
               "Bakes that wait; a submit above it is refused");
   options.add("--max-running-bakes,--max-running", limits.max_running_bakes, whole_number(1, 1024),
               "Bakes at the same time");
@@ -184,12 +186,25 @@ Error contradiction(const std::string& key, const std::string& value, const std:
 }
 
 /// Whether two addresses cannot both be listened on.
-bool collide(const std::string& one, const std::string& other) {
-  const auto port_of = [](const std::string& address) { return address.substr(address.rfind(':') + 1); };
-  if (other.starts_with("unix:") || port_of(one) == "0" || port_of(one) != port_of(other)) return false;
+bool collide(const access::AddressText& one, const access::AddressText& other) {
+  if (!other.path.empty() || one.port == 0 || one.port != other.port) return false;
   const auto is_any = [](const std::string& host) { return host == "0.0.0.0" || host == "::"; };
-  const std::string host = host_of(one), other_host = host_of(other);
-  return host == other_host || is_any(host) || is_any(other_host) || (is_local(one) && is_local(other));
+  const bool are_local = is_local(one).value_or(false) && is_local(other).value_or(false);
+  return one.host == other.host || is_any(one.host) || is_any(other.host) || are_local;
+}
+
+Result<void> check_admin_port(const ServerConfig& config) {
+  const BakeServerOptions& server = config.server;
+  if (server.admin_listen.empty()) return {};
+  const auto admin = access::read_address(server.admin_listen), main = access::read_address(server.listen);
+  if (collide(*admin, *main)) {
+    return contradiction("admin-listen", server.admin_listen, "another port than listen, which is " + server.listen);
+  }
+  if (!is_local(*admin).value_or(false) && !config.is_admin_port_open) {
+    return contradiction("admin-listen", server.admin_listen,
+                         "an address of the loopback, unless admin-open=true says that others may reach it");
+  }
+  return {};
 }
 
 /// Values that are good alone and not together.
@@ -209,15 +224,10 @@ Result<void> check_together(const ServerConfig& config) {
     return contradiction("min-atlas-size", std::to_string(limits.min_atlas_size),
                          "at most max-atlas-size, which is " + std::to_string(limits.max_atlas_size));
   }
-  if (server.admin_listen.empty()) return {};
-  if (collide(server.admin_listen, server.listen)) {
-    return contradiction("admin-listen", server.admin_listen, "another port than listen, which is " + server.listen);
-  }
-  if (!is_local(server.admin_listen) && !config.is_admin_port_open) {
-    return contradiction("admin-listen", server.admin_listen,
-                         "an address of the loopback, unless admin-open=true says that others may reach it");
-  }
-  return {};
+  RADBAKE_RETURN_IF_ERROR(check_admin_port(config));
+  // What a name stands for shows at the start, which checks once more.
+  const bool may_be_local = is_local(*access::read_address(server.listen)).value_or(true);
+  return access::check_access(server.access, server.listen, may_be_local);
 }
 
 /// CLI11's message as one line.

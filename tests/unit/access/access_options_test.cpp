@@ -52,9 +52,19 @@ TEST(ListenAddress, KnowsWhoCanReachIt) {
   }
 }
 
+TEST(ListenAddress, KnowsWithoutAskingWhoCanReachANumber) {
+  for (const char* local : {"unix:/run/x", "127.0.0.1:1", "127.255.0.3:1", "[::1]:1", "localhost:1"}) {
+    EXPECT_EQ(is_local(*read_address(local)), true) << local;
+  }
+  for (const char* open : {"0.0.0.0:1", "[::]:1", "192.0.2.1:1", "128.0.0.1:1", "[::ffff:192.0.2.1]:1"}) {
+    EXPECT_EQ(is_local(*read_address(open)), false) << open;
+  }
+  EXPECT_EQ(is_local(*read_address("localhost.example.org:1")), std::nullopt);
+}
+
 TEST(ListenAddress, RefusesWhatIsNoAddress) {
   for (const char* wrong : {"", "7419", "localhost", ":7419", "127.0.0.1:", "127.0.0.1:70000", "127.0.0.1:7419x",
-                            "::1:7", "unix:", "127.0.0.1:-1"}) {
+                            "::1:7", "[]:7", "a b:7", "unix:", "127.0.0.1:-1"}) {
     const auto address = resolve_listen_address(wrong);
     ASSERT_FALSE(address.ok()) << wrong;
     EXPECT_THAT(address.error().message, HasSubstr("--listen")) << wrong;

@@ -41,12 +41,16 @@ std::string method_label(const char* method) {
   return known == nullptr ? "other" : name;
 }
 
-spdlog::level::level_enum level_of(grpc::StatusCode code) {
+/// An upload whose bytes do not have their digest ends with DATA_LOSS by its client's fault, any other call by ours.
+constexpr std::string_view kUpload = "radbake.v1.Content/Upload";
+
+spdlog::level::level_enum level_of(std::string_view method, grpc::StatusCode code) {
   switch (code) {
     case grpc::StatusCode::OK:
     case grpc::StatusCode::CANCELLED: return spdlog::level::debug;
     case grpc::StatusCode::INTERNAL:
     case grpc::StatusCode::UNKNOWN: return spdlog::level::err;
+    case grpc::StatusCode::DATA_LOSS: return method == kUpload ? spdlog::level::info : spdlog::level::err;
     default: return spdlog::level::info;
   }
 }
@@ -87,8 +91,9 @@ class CallWatch : public grpc::experimental::Interceptor {
     const double seconds = std::chrono::duration<double>(Clock::now() - began_at_).count();
     metrics_.rpc_ended(method_, code_name(status.error_code()), seconds);
     const LogTrace trace(trace_id_);
-    spdlog::log(level_of(status.error_code()), "{} {} after {:.3f} s{}{}", method_, code_name(status.error_code()),
-                seconds, status.error_message().empty() ? "" : ": ", status.error_message());
+    spdlog::log(level_of(method_, status.error_code()), "{} {} after {:.3f} s{}{}", method_,
+                code_name(status.error_code()), seconds, status.error_message().empty() ? "" : ": ",
+                status.error_message());
   }
 
   Metrics& metrics_;

@@ -150,6 +150,8 @@ void declare_options(CLI::App& app, OptionList& options, ServerConfig& config) {
               "Workers that may die in a row over a bake that does not get on, until it fails");
   options.add("--max-restarts", server.queue.max_lost_attempts, whole_number(1, 1'000'000),
               "Ends of the server, not in good order, in a row over a bake that does not get on, until it fails");
+  options.add("--max-bake-time", server.queue.bake_limit, seconds(0, 366.0 * 86'400),
+              "How long an attempt at a bake may take until it fails; 0: as long as it needs");
   options.add("--max-bake-memory-bytes,--max-bake-memory", server.queue.worker.limits.address_space_bytes,
               byte_size(0, 1024 * kTiB), "Address space of a bake's worker; 0: as the machine has");
   declare_access(app, options, server.access);

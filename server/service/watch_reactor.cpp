@@ -98,7 +98,7 @@ Result<bool> WatchReactor::next_message() {
     return true;
   }
   // The state is read first: what belongs to an end that it shows is there by then.
-  const bool has_ended = store::is_terminal(job_->record().state);
+  const bool has_ended = store::is_terminal(job_->state());
   if (const auto events = job_->events_after(last_sequence_); !events.empty()) {
     *response_.mutable_event() = to_message(events.front());
     last_sequence_ = events.front().sequence;

@@ -97,6 +97,7 @@ std::map<std::string, std::vector<std::string>> bad_values() {
       {"max-running-bakes", with(kBadNumbers, {"0", "1025"})},
       {"max-attempts", with(kBadNumbers, {"0", "1000001"})},
       {"max-restarts", with(kBadNumbers, {"0", "1000001"})},
+      {"max-bake-time", {"", "-1", "1e3", "5s", "31622401"}},
       {"max-bake-memory-bytes", with(kBadSizes, {"1025T"})},
       {"max-content-bytes", with(kBadSizes, {"1025T"})},
       {"tls-cert", {""}},

@@ -2,6 +2,7 @@
 #include <map>
 
 #include "client/api/connection.h"
+#include "common/base/version.h"
 
 namespace radbake::api {
 namespace {
@@ -72,7 +73,9 @@ class Upload {
     v1::UploadResult result;
     v1::UploadChunk chunk;
     fill(blob_.digest, chunk.mutable_digest());
-    chunk.set_wants_progress(true);
+    // An older server would not answer, and we wait for ever.
+    const bool wants_answers = connection_.capabilities.protocol_minor() >= kAnswersChunksMinor;
+    chunk.set_wants_progress(wants_answers);
     std::uint64_t offset = offset_;
     bool is_last = false;
     // An empty blob is one empty chunk.
@@ -87,7 +90,7 @@ class Upload {
       offset += size;
       on_sent(offset);
       // What is on its way when the connection breaks has to be sent again: never more than this chunk.
-      if (!stream->Read(&result) || result.already_present()) break;
+      if (wants_answers && (!stream->Read(&result) || result.already_present())) break;
       chunk.Clear();
     }
     stream->WritesDone();

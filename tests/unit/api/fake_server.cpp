@@ -21,6 +21,7 @@ FakeServer::FakeServer() {
   folder_ = mkdtemp(path.data());
   capabilities.set_engine_version(kEngineVersion);
   capabilities.set_protocol_major(kProtocolMajor);
+  capabilities.set_protocol_minor(kProtocolMinor);
   capabilities.mutable_limits()->set_chunk_bytes(kChunkBytes);
   capabilities.mutable_limits()->set_max_digests_per_call(3);
   finished.set_state(v1::SUCCEEDED);
@@ -66,11 +67,13 @@ grpc::Status FakeServer::Upload(Context*, grpc::ServerReaderWriter<v1::UploadRes
   v1::UploadChunk chunk;
   v1::UploadResult answer;
   std::string sha256;
+  bool tells_progress = false;
   while (stream->Read(&chunk)) {
     const std::scoped_lock lock(mutex_);
     if (chunk.has_digest()) {
       sha256 = chunk.digest().sha256();
       upload_offsets.push_back(chunk.offset());
+      tells_progress = chunk.wants_progress() && capabilities.protocol_minor() > 0;
     }
     std::string& bytes = partial_[sha256];
     if (chunk.offset() != bytes.size()) return {grpc::StatusCode::OUT_OF_RANGE, "gap"};
@@ -83,7 +86,7 @@ grpc::Status FakeServer::Upload(Context*, grpc::ServerReaderWriter<v1::UploadRes
     }
     answer.set_committed_bytes(bytes.size());
     if (!chunk.finish()) {
-      stream->Write(answer);
+      if (tells_progress) stream->Write(answer);
       continue;
     }
     if (digest_of(bytes).sha256 != sha256) return {grpc::StatusCode::DATA_LOSS, "wrong digest"};

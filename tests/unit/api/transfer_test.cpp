@@ -58,6 +58,17 @@ TEST_F(Transfer, AsksForNoMoreDigestsACallThanTheServerTakes) {
   EXPECT_THAT(server_.blobs, SizeIs(7));
 }
 
+TEST_F(Transfer, WaitsForNoAnswerThatAnOlderServerDoesNotGive) {
+  FakeServer older;
+  older.capabilities.set_protocol_minor(0);
+  Result<Client> client = Client::connect(older.address(), impatient());
+  ASSERT_TRUE(client.ok()) << client.error().message;
+  const std::vector<BlobView> blobs = {blob(some_bytes(5000))};
+  const Result<std::uint64_t> sent = client->upload_missing(blobs);
+  ASSERT_TRUE(sent.ok()) << sent.error().message;
+  EXPECT_EQ(older.blobs[blobs[0].digest.sha256], *kept_[0]);
+}
+
 TEST_F(Transfer, ResumesABrokenUploadWhereItEnded) {
   server_.break_uploads_at = 2500;
   const std::vector<BlobView> blobs = {blob(some_bytes(5000))};

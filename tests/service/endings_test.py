@@ -28,23 +28,31 @@ SHORT = {"atlas_size": 64, "rays": 8, "max_patches": 64}
 STREAMS = ("Upload", "Download", "WatchBake")
 GARBAGE = b"\xff\xff\xff\xff no message"
 
-# Opens calls of all kinds and waits to be killed.
+# More than a connection takes that nobody reads from.
+LARGE = bytes(16 << 20)
+
+# Opens calls that last, makes plans without end, and waits to be killed. Digests are SHA-256:SIZE.
 DYING_CLIENT = """
-import sys
-sys.path[:0] = sys.argv[3:]
+import sys, time
+address, watched, manifest, large, *folders = sys.argv[1:]
+sys.path[:0] = folders
 import grpc
 from radbake.v1 import bake_pb2, bake_pb2_grpc, content_pb2, content_pb2_grpc
-channel = grpc.insecure_channel(sys.argv[1])
+def digest(text):
+    sha256, size = text.split(":")
+    return content_pb2.Digest(sha256=sha256, size_bytes=int(size))
+channel = grpc.insecure_channel(address)
 bakes, content = bake_pb2_grpc.BakesStub(channel), content_pb2_grpc.ContentStub(channel)
 def endless():
-    yield content_pb2.UploadChunk(digest=content_pb2.Digest(sha256="0" * 64, size_bytes=1 << 20), data=b"x")
-    import time; time.sleep(1000)
-watch = bakes.WatchBake(bake_pb2.WatchBakeRequest(name=sys.argv[2], include_tiles=True))
+    yield content_pb2.UploadChunk(digest=digest("0" * 64 + ":1000000"), data=b"x")
+    time.sleep(1000)
+watch = bakes.WatchBake(bake_pb2.WatchBakeRequest(name=watched, include_tiles=True))
 next(watch)
+download = content.Download(content_pb2.DownloadRequest(digest=digest(large)))
+next(download)
 upload = content.Upload(endless())
-plan = bakes.PlanBake.future(bake_pb2.PlanBakeRequest())
-print("open", flush=True)
-import time; time.sleep(1000)
+while True:
+    bakes.PlanBake(bake_pb2.PlanBakeRequest(manifest=digest(manifest)))
 """
 
 
@@ -137,6 +145,18 @@ class Endings(unittest.TestCase):
         descriptors = len(list(pathlib.Path(f"/proc/{self.server.pid}/fd").iterdir()))
         return {"calls": calls, "plans": metrics["radbake_running_plans"], "descriptors": descriptors}
 
+    def wait_until_open(self, process, *methods):
+        """Waits until a process holds calls of all these methods, and a plan is being made."""
+        limit = time.monotonic() + LIMIT_SECONDS
+        while True:
+            metrics = self.metrics()
+            is_open = [any(name.startswith("radbake_rpcs_open") and f"{method}\"" in name and value == 1
+                           for name, value in metrics.items()) for method in methods]
+            if all(is_open) and metrics["radbake_running_plans"] == 1:
+                return
+            self.assertIsNone(process.poll())
+            self.assertLess(time.monotonic(), limit, f"open: {is_open}")
+
     def expect_nothing_held(self, before):
         limit = time.monotonic() + LIMIT_SECONDS
         while True:
@@ -213,16 +233,16 @@ class Endings(unittest.TestCase):
                 self.expect_nothing_held(before)
 
     def test_with_a_client_that_is_killed(self):
+        self.client.upload(LARGE)
         before = self.held()
         self.partial = 1
+        digests = [f"{digest.sha256}:{digest.size_bytes}" for digest in (digest_of(self.manifest), digest_of(LARGE))]
         for _ in range(5):
             dying = subprocess.Popen(
-                [sys.executable, "-B", "-c", DYING_CLIENT, self.address, self.long, str(STUBS)],
-                stdout=subprocess.PIPE, text=True)
-            self.assertEqual(dying.stdout.readline(), "open\n")
+                [sys.executable, "-B", "-c", DYING_CLIENT, self.address, self.long, *digests, str(STUBS)])
+            self.wait_until_open(dying, "WatchBake", "Download", "Upload", "PlanBake")
             dying.send_signal(signal.SIGKILL)
             dying.wait(timeout=LIMIT_SECONDS)
-            dying.stdout.close()
             self.expect_nothing_held(before)
 
     def test_with_a_server_that_is_stopped(self):

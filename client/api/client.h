@@ -64,7 +64,8 @@ class Client {
   ///
   /// `address`: HOST:PORT, HOST (port 7419) or unix:PATH.
   /// Errors: kUnavailable when nobody answers; kFailedPrecondition for another protocol version, or where the server
-  /// does not accept who calls; kInvalidArgument for security options that do not go together.
+  /// does not accept who calls; kInvalidArgument for security options that do not go together, for files that are
+  /// no PEM and for a token that would travel readable for all; kNotFound for files that are not there.
   static Result<Client> connect(const std::string& address, const ClientOptions& options = {},
                                 std::stop_token stop = {});
   ~Client();

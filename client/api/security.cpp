@@ -1,33 +1,55 @@
 #include "client/api/security.h"
 
+#include <arpa/inet.h>
+
+#include <cstdint>
 #include <fstream>
-#include <iterator>
+#include <sstream>
+#include <utility>
 
 namespace radbake::api {
 namespace {
 
-/// This machine: a token does not leave it.
-bool is_local(const std::string& address) {
-  for (const char* start : {"unix:", "127.", "localhost", "[::1]", "::1"}) {
-    if (address.rfind(start, 0) != 0) continue;
-    // localhost.example.org is elsewhere.
-    if (std::string(start) != "localhost") return true;
-    return address.size() == 9 || address[9] == ':';
+/// The host of HOST:PORT, HOST, [ADDRESS]:PORT, [ADDRESS] or a bare IPv6 address; of anything else, anything.
+std::string host_of(const std::string& address) {
+  if (address.starts_with('[')) {
+    const std::size_t end = address.find(']');
+    const bool ends_well = end != std::string::npos && (end + 1 == address.size() || address[end + 1] == ':');
+    return ends_well ? address.substr(1, end - 1) : address;
   }
-  return false;
+  const std::size_t colon = address.find(':');
+  const bool is_bare_ipv6 = colon != std::string::npos && address.find(':', colon + 1) != std::string::npos;
+  return is_bare_ipv6 ? address : address.substr(0, colon);
+}
+
+/// This machine: a token does not leave it. Of names localhost alone: others resolve to what they like.
+bool is_local(const std::string& address) {
+  if (address.starts_with("unix:")) return true;
+  const std::string host = host_of(address);
+  in_addr v4{};
+  in6_addr v6{};
+  constexpr std::uint32_t kLoopbackNet = 127;
+  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == kLoopbackNet;
+  if (inet_pton(AF_INET6, host.c_str(), &v6) == 1) return IN6_IS_ADDR_LOOPBACK(&v6);
+  return host == "localhost";
 }
 
 Result<std::string> read_pem(const std::filesystem::path& file, const std::string& what) {
   if (file.empty()) return std::string();
+  // A stream reads a folder, too, but throws.
+  std::error_code failure;
+  if (std::filesystem::is_directory(file, failure)) {
+    return invalid_argument(what + " " + file.string() + " is a folder, not a file");
+  }
   std::ifstream stream(file, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(stream), {});
-  if (!stream.good() && text.empty()) {
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf())) {
     return Error{ErrorCode::kNotFound, what + " " + file.string() + " cannot be read, or is empty"};
   }
-  if (text.find("-----BEGIN ") == std::string::npos) {
+  if (text.view().find("-----BEGIN ") == std::string::npos) {
     return invalid_argument(what + " " + file.string() + " is not in PEM (-----BEGIN ...)");
   }
-  return text;
+  return std::move(text).str();
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace radbake::api {
 
 /// What a channel to an address speaks: plain HTTP/2, or TLS where `security` names authorities.
 ///
-/// Errors: kInvalidArgument for options that do not go together, kNotFound for files that are not there, and a token
-/// that would travel readable for all.
+/// Errors: kInvalidArgument for options that do not go together, for files that are no PEM and for a token that would
+/// travel readable for all; kNotFound for files that are not there.
 Result<std::shared_ptr<grpc::ChannelCredentials>> make_credentials(const std::string& address,
                                                                    const ClientSecurity& security);
 

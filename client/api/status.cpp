@@ -2,6 +2,7 @@
 
 #include <grpcpp/support/status_code_enum.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "google/rpc/error_details.pb.h"
@@ -35,6 +36,15 @@ ErrorCode to_code(int status_code) {
 /// "a: b", or the one that is there.
 std::string joined(const std::string& a, const std::string& b) { return a.empty() ? b : b.empty() ? a : a + ": " + b; }
 
+/// Limits on what the server has room for, whatever it is sent. Older servers name them in the description alone.
+bool is_lack_of_room(const google::rpc::QuotaFailure& quota) {
+  return std::any_of(quota.violations().begin(), quota.violations().end(), [](const auto& violation) {
+    const std::string words = joined(violation.subject(), violation.description());
+    return words.find("min_free_disk_bytes") != std::string::npos ||
+           words.find("max_content_bytes") != std::string::npos;
+  });
+}
+
 std::vector<std::string> details_in_words(const google::protobuf::Any& detail) {
   std::vector<std::string> words;
   google::rpc::BadRequest bad_request;
@@ -67,6 +77,9 @@ Error to_error(const google::rpc::Status& status) {
       if (error.code == ErrorCode::kResourceExhausted) error.code = ErrorCode::kUnavailable;
       continue;
     }
+    // What the server is like, not what it was sent.
+    google::rpc::QuotaFailure quota;
+    if (detail.UnpackTo(&quota) && is_lack_of_room(quota)) error.code = ErrorCode::kFailedPrecondition;
     for (const std::string& words : details_in_words(detail)) {
       if (words.empty() || error.message.find(words) != std::string::npos) continue;
       if (++num_details <= kMaxDetailsShown) error.message += "; " + words;

@@ -49,5 +49,9 @@ Result<Session> open_session(const CommandContext& context);
 /// Reports an error and returns its exit code.
 ExitCode fail(const CommandContext& context, const Error& error);
 ExitCode fail(const CommandContext& context, const Error& error, ExitCode exit_code);
+/// The same of open_session(): what is no good before anything was sent are the options.
+ExitCode fail_to_connect(const CommandContext& context, const Error& error);
+/// The same of a bake that failed or was cancelled, with the trace by which the server's log tells of it.
+ExitCode fail_with(const CommandContext& context, const v1::Bake& bake);
 
 }  // namespace radbake::cli

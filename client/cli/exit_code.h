@@ -10,7 +10,7 @@ enum ExitCode : int {
   kDone = 0,
   kUsage = 2,
   kBadScene = 3,
-  kServerUnreachable = 4,
+  kServerUnreachable = 4,  ///< or it does not take what was sent: no room, no access, another protocol
   kBakeFailed = 5,
   kCancelledExit = 6,
   kTargetMissed = 7,  ///< submit --strict: all is written, and the error that was asked for was not reached

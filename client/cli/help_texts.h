@@ -14,8 +14,8 @@ inline constexpr char kTokenHelp[] =
     "File whose first line is this client's token, for a server that asks for one (environment: RADBAKE_TOKEN, the "
     "token itself)";
 inline constexpr char kExitCodes[] =
-    "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, 5 bake failed, 6 cancelled, 7 error asked for "
-    "not reached (--strict), 130 left by Ctrl-C.\n";
+    "Exit codes: 0 done, 2 usage, 3 bad scene, 4 server unreachable, unwilling or without room, 5 bake failed, "
+    "6 cancelled, 7 error asked for not reached (--strict), 130 left by Ctrl-C.\n";
 
 inline constexpr char kMainFooter[] =
     "\nExamples:\n"
@@ -89,9 +89,8 @@ inline constexpr char kPlanFooter[] =
     "  radbake plan room.glb --json | jq .prediction.total.cpu_seconds\n\n";
 
 inline constexpr char kListFooter[] =
-    "\nOf bakes that wait: their place in the queue and when they may start; \"shares NAME\" where an equal bake runs "
-    "for\n"
-    "them, too.\n"
+    "\nOf bakes that wait: their place in the queue and when they may start; \"shares NAME\" where an equal bake\n"
+    "runs for them, too.\n"
     "\nExamples:\n"
     "  radbake list --server bakery:7419\n"
     "  radbake list --json | jq -r '.bakes[] | select(.state == \"FAILED\") | .name'\n\n";

@@ -67,7 +67,7 @@ std::string describe(const v1::Capabilities& server) {
 
 ExitCode run_list(const CommandContext& context) {
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   const Result<std::vector<v1::Bake>> bakes = session->client.list(context.interrupt.once());
   if (!bakes.ok()) return fail(context, bakes.error());
   std::string text;
@@ -83,7 +83,7 @@ ExitCode run_list(const CommandContext& context) {
 
 ExitCode run_watch(const CommandContext& context) {
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   const std::string& name = context.line.job;
   const std::stop_token stop = context.interrupt.once();
   const Result<v1::Bake> bake = session->client.watch(
@@ -93,15 +93,14 @@ ExitCode run_watch(const CommandContext& context) {
     context.reporter.note("left " + name + "; it goes on");
     return kLeft;
   }
-  const ExitCode code = exit_code_of(*bake);
-  if (code != kDone) return fail(context, error_of(*bake), code);
+  if (bake->state() != v1::SUCCEEDED) return fail_with(context, *bake);
   context.reporter.note(name + " succeeded; get it with radbake download " + name + " -o DIR");
   return kDone;
 }
 
 ExitCode run_cancel(const CommandContext& context) {
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   const Result<v1::Bake> bake = session->client.cancel(context.line.job, context.interrupt.once());
   if (!bake.ok()) return fail(context, bake.error());
   const bool has_ended = bake->state() >= v1::SUCCEEDED;
@@ -112,7 +111,7 @@ ExitCode run_cancel(const CommandContext& context) {
 
 ExitCode run_finish(const CommandContext& context) {
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   const Result<v1::Bake> bake = session->client.finish(context.line.job, context.interrupt.once());
   if (!bake.ok()) return fail(context, bake.error());
   const bool has_ended = bake->state() >= v1::SUCCEEDED;
@@ -127,7 +126,7 @@ ExitCode run_download(const CommandContext& context) {
   if (!folder.ok()) return fail(context, folder.error(), kUsage);
   Stopwatch stages;
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   stages.end_stage("connect");
   const Result<v1::Bake> bake = session->client.get(context.line.job, context.interrupt.once());
   if (!bake.ok()) return fail(context, bake.error());
@@ -137,8 +136,7 @@ ExitCode run_download(const CommandContext& context) {
                                            "; radbake watch " + bake->name() + " waits for it"},
                 kUsage);
   }
-  const ExitCode code = exit_code_of(*bake);
-  if (code != kDone) return fail(context, error_of(*bake), code);
+  if (bake->state() != v1::SUCCEEDED) return fail_with(context, *bake);
   const std::stop_token stop = context.interrupt.once();
   std::optional<BakedScene> scene;
   if (context.line.scene.empty()) {
@@ -155,7 +153,7 @@ ExitCode run_download(const CommandContext& context) {
 
 ExitCode run_capabilities(const CommandContext& context) {
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   const v1::Capabilities& server = session->client.capabilities();
   context.reporter.answer(describe(server), to_json(server));
   return kDone;

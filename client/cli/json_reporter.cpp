@@ -61,6 +61,8 @@ class JsonReporter final : public Reporter {
     is_stream_ ? event("failed", {{"error", failure}}) : print({{"error", failure}});
   }
 
+  void set_trace(const std::string& trace_id) override { trace_id_ = trace_id; }
+
  private:
   void event(const std::string& name, const Json& fields) {
     if (!is_stream_) return;

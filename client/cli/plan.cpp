@@ -32,7 +32,7 @@ ExitCode run_plan(const CommandContext& context) {
   Stopwatch stages;
   context.reporter.stage("connecting", -1);
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   stages.end_stage("connect");
   const Result<void> within_limits = check_limits(context.line.bake, session->client.capabilities().limits());
   if (!within_limits.ok()) return fail(context, within_limits.error(), kUsage);

@@ -30,13 +30,15 @@ class Reporter {
   /// Something to know that is no result.
   virtual void note(const std::string& text) = 0;
   virtual void failed(const Error& error, ExitCode exit_code) = 0;
+  /// What fails from now on is of this trace.
+  virtual void set_trace(const std::string& trace_id) = 0;
 };
 
 /// For people: progress as a line that redraws itself, or as plain lines where stderr is no terminal.
 std::unique_ptr<Reporter> make_text_reporter();
 
 /// For programs. `is_stream`: one event a line, the first of which is "submitted" or "failed"; else one object in all.
-/// `trace_id`: told with what was submitted and with what failed.
+/// `trace_id`: told with what was submitted and with what failed, unless that has a trace of its own.
 std::unique_ptr<Reporter> make_json_reporter(bool is_stream, const std::string& trace_id);
 
 /// A bake's state in words: "form factors".

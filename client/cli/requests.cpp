@@ -22,9 +22,9 @@ Request request_of(const CommandLine& line, const Digest& manifest) {
 v1::SubmitBakeRequest submit_request(const CommandLine& line, const Digest& manifest) {
   auto request = request_of<v1::SubmitBakeRequest>(line, manifest);
   request.set_request_id(api::make_request_id());
-  // Protobuf's texts are UTF-8, file names are bytes.
   request.set_priority(line.priority);
   request.set_no_cache(line.no_cache);
+  // Protobuf's texts are UTF-8, file names are bytes.
   request.set_label(to_utf8(line.scene.filename().string()));
   return request;
 }

@@ -44,8 +44,10 @@ Result<api::ClientSecurity> read_security(const SecurityChoices& choices) {
     return invalid_argument("RADBAKE_TOKEN is not a token: visible ASCII characters without blanks");
   }
   std::ifstream file(choices.token_file);
-  if (!file) return invalid_argument("--token-file " + choices.token_file.string() + " cannot be read");
-  std::getline(file, security.token);
+  // A folder opens, but has no lines.
+  if (!file || !std::getline(file, security.token)) {
+    return invalid_argument("--token-file " + choices.token_file.string() + " cannot be read, or is empty");
+  }
   if (is_token(security.token)) return security;
   return invalid_argument("--token-file " + choices.token_file.string() +
                           ": its first line is not a token: visible ASCII characters without blanks");

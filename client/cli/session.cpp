@@ -96,4 +96,17 @@ ExitCode fail(const CommandContext& context, const Error& error) {
   return fail(context, error, exit_code_of(error.code));
 }
 
+ExitCode fail_to_connect(const CommandContext& context, const Error& error) {
+  return fail(context, error, error.code == ErrorCode::kInvalidArgument ? kUsage : exit_code_of(error.code));
+}
+
+ExitCode fail_with(const CommandContext& context, const v1::Bake& bake) {
+  Error error = error_of(bake);
+  if (!bake.trace_id().empty()) {
+    context.reporter.set_trace(bake.trace_id());
+    if (bake.state() == v1::FAILED) error.message += " [trace " + bake.trace_id() + "]";
+  }
+  return fail(context, error, exit_code_of(bake));
+}
+
 }  // namespace radbake::cli

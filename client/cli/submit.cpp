@@ -62,6 +62,15 @@ bool tell_error(const CommandContext& context, const v1::BakeReport& report) {
   return is_reached;
 }
 
+/// Ends a command whose bake others will ask for.
+ExitCode leave(const CommandContext& context, const v1::Bake& bake) {
+  const bool has_ended = bake.state() >= v1::SUCCEEDED;
+  if (has_ended && bake.state() != v1::SUCCEEDED) return fail_with(context, bake);
+  context.reporter.note(bake.name() + (has_ended ? " has its result" : " goes on without us") +
+                        "; get it with radbake download " + bake.name() + " -o DIR");
+  return kDone;
+}
+
 }  // namespace
 
 ExitCode run_submit(const CommandContext& context) {
@@ -76,18 +85,23 @@ ExitCode run_submit(const CommandContext& context) {
   Stopwatch stages;
   context.reporter.stage("connecting", -1);
   Result<Session> session = open_session(context);
-  if (!session.ok()) return fail(context, session.error());
+  if (!session.ok()) return fail_to_connect(context, session.error());
   stages.end_stage("connect");
   const Result<void> within_limits = check_limits(line.bake, session->client.capabilities().limits());
   if (!within_limits.ok()) return fail(context, within_limits.error(), kUsage);
 
   // Load the image library aside: it costs 0.3 s of one core, and results are to be written as soon as they are there.
-  auto loading = std::async(std::launch::async, [] { return image::load_image_codec(); });
+  std::future<Result<const image::ImageCodec*>> loading;
+  if (!line.detach) loading = std::async(std::launch::async, [] { return image::load_image_codec(); });
 
   Result<ReadScene> read = read_and_encode(context, stages);
   if (!read.ok()) return fail(context, read.error());
-  Result<BakedScene> kept = keep_for_writing(line.scene, std::move(read->scene), read->encoded);
-  if (!kept.ok()) return fail(context, kept.error());
+  std::optional<BakedScene> scene;
+  if (!line.detach) {
+    Result<BakedScene> kept = keep_for_writing(line.scene, std::move(read->scene), read->encoded);
+    if (!kept.ok()) return fail(context, kept.error());
+    scene = std::move(kept).value();
+  }
   const Result<void> uploaded = upload(context, session->client, read->encoded, stages);
   if (!uploaded.ok()) return fail(context, session->explain(uploaded.error()));
   // Without the stop token: a submit that was sent and not answered would leave a bake that nobody can name.
@@ -98,10 +112,7 @@ ExitCode run_submit(const CommandContext& context) {
   if (bake->from_store()) {
     context.reporter.note("the server has baked this before: its result is the answer (--no-cache: bake again)");
   }
-  if (line.detach) {
-    context.reporter.note(name + " goes on without us; get it with radbake download " + name + " -o DIR");
-    return kDone;
-  }
+  if (line.detach) return leave(context, *bake);
   // Not after the bake: hours of work would be out of reach, on a private server for ever.
   if (const Result<const image::ImageCodec*> images = loading.get(); !images.ok()) {
     Error error = images.error();
@@ -117,16 +128,10 @@ ExitCode run_submit(const CommandContext& context) {
     return fail(context, error);
   }
   stages.end_stage("bake");
-  if (bake->state() != v1::SUCCEEDED) {
-    Error error = error_of(*bake);
-    // By it the server's log tells which lines are about this bake.
-    if (bake->state() == v1::FAILED) error.message += " [trace " + context.trace.trace_id + "]";
-    return fail(context, error, exit_code_of(*bake));
-  }
+  if (bake->state() != v1::SUCCEEDED) return fail_with(context, *bake);
 
   const bool is_reached = tell_error(context, bake->result().report());
   const std::optional<SceneReport> report = std::move(read->report);
-  const std::optional<BakedScene> scene = std::move(*kept);
   const Result<void> written = write_results(session->client, {*bake, report, scene, line.files}, *folder, stages,
                                              context.reporter, context.interrupt.twice());
   if (!written.ok()) return fail(context, session->explain(written.error()));

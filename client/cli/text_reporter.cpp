@@ -43,6 +43,7 @@ class TextReporter final : public Reporter {
   void answer(const std::string& text, const nlohmann::ordered_json&) override { print(text); }
   void note(const std::string& text) override { say("", "", text); }
   void failed(const Error& error, ExitCode) override { say("error: ", "31", error.message); }
+  void set_trace(const std::string&) override {}
 
  private:
   void show(const v1::Progress& progress) {

@@ -79,9 +79,25 @@ class Tokens(SecurityTest):
 
     def test_a_token_is_not_sent_readable_for_others(self):
         result = self.run_cli("list", "--server", "bakery.example:7419", "--token-file", self.place / "token")
-        self.assertNotEqual(result.returncode, 0)
+        self.assert_exit(result, 2)
         self.assertIn("without TLS", result.stderr)
         self.assertNotIn(TOKEN, result.stderr)
+
+    def test_tls_options_that_are_no_good_are_usage_errors_that_name_their_file(self):
+        (self.place / "no.pem").write_text("no certificate\n")
+        ca = self.made / "ca.pem"
+        for name, arguments in (
+                ("tmp", ["--tls-ca", self.place / "tmp"]),
+                ("no.pem", ["--tls-ca", self.place / "no.pem"]),
+                ("nowhere", ["--tls-ca", self.place / "nowhere"]),
+                ("tmp", ["--tls-ca", ca, "--tls-cert", self.place / "tmp", "--tls-key", self.made / "alice.key"]),
+                ("tmp", ["--tls-ca", ca, "--tls-cert", self.made / "alice.pem", "--tls-key", self.place / "tmp"]),
+                ("--tls-key", ["--tls-ca", ca, "--tls-cert", self.made / "alice.pem"]),
+                ("tmp", ["--token-file", self.place / "tmp"])):
+            with self.subTest(arguments=arguments):
+                result = self.run_cli("list", "--server", "localhost:1", *arguments)
+                self.assert_exit(result, 2)
+                self.assertIn(name, result.stderr)
 
     def test_a_token_file_without_a_token_is_a_bad_option(self):
         (self.place / "token").write_text("two words\n")

@@ -684,6 +684,43 @@ class SharedServer(CliTest):
         self.assertRegex(error["trace_id"], "^[0-9a-f]{32}$")
         self.assertTrue(error["message"].endswith(f"[trace {error['trace_id']}]"), error)
 
+    def test_whoever_asks_later_is_told_the_trace_of_the_bake(self):
+        submitted = self.run_cli("submit", CORNELL, "-o", self.place / "out", "--json", "--effect", "sun=on", *QUICK)
+        first = json.loads(submitted.stdout.splitlines()[0])
+        name, trace = first["bake"]["name"], first["trace_id"]
+        watched = self.run_cli("watch", name, "--json")
+        downloaded = self.run_cli("download", name, "-o", self.place / "later", "--json")
+        for result in (watched, downloaded):
+            self.assert_exit(result, 3)
+            error = json.loads(result.stdout.splitlines()[-1])["error"]
+            self.assertEqual(error["trace_id"], trace)
+            self.assertTrue(error["message"].endswith(f"[trace {trace}]"), error)
+
+    def test_a_detached_submit_is_found_and_downloaded_later(self):
+        submitted = self.run_cli("submit", CORNELL, "--detach", "--priority", "7", *QUICK)
+        self.assert_exit(submitted, 0)
+        name = submitted.stdout.strip()
+        self.assertRegex(name, r"^bakes/\w+$")
+        self.assertIn(f"{name} goes on without us", submitted.stderr)
+        (bake,) = self.bakes()
+        self.assertEqual((bake["name"], bake["priority"], bake["label"]), (name, 7, "cornell.glb"))
+        self.assert_exit(self.run_cli("watch", name), 0)
+        self.assert_exit(self.run_cli("download", name, "-o", self.place / "out"), 0)
+        self.assertTrue((self.place / "out" / "report.json").exists())
+        # The same again has its result at once.
+        again = self.run_cli("submit", CORNELL, "--detach", *QUICK)
+        self.assert_exit(again, 0)
+        self.assertIn(f"{again.stdout.strip()} has its result", again.stderr)
+        self.assertNotIn("goes on", again.stderr)
+
+    def test_a_bake_of_higher_priority_starts_earlier(self):
+        running = self.run_cli("submit", CORNELL, "--detach", *LONG).stdout.strip()
+        last, first = (self.run_cli("submit", CORNELL, "--detach", "--priority", priority, *QUICK, "--seed", seed)
+                       .stdout.strip() for priority, seed in (("-5", "1"), ("5", "2")))
+        places = {bake["name"]: bake["queue_position"] for bake in self.bakes()}
+        self.assertEqual((places[first], places[last]), (1, 2))
+        self.assert_exit(self.run_cli("cancel", running), 0)
+
     def test_an_unknown_job_is_a_usage_error(self):
         for arguments in (["watch", "nobody"], ["finish", "nobody"], ["cancel", "nobody"], ["download", "nobody", "-o", self.place / "out"]):
             result = self.run_cli(*arguments)

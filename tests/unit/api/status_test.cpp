@@ -56,6 +56,16 @@ TEST(StatusInWords, NamesTheQuotaAndItsValue) {
   EXPECT_EQ(error.message, "too large; max_triangles: 60000000 above the limit 50000000");
 }
 
+TEST(StatusInWords, BlamesAServerWithoutRoomAndNoScene) {
+  for (const char* limit : {"min_free_disk_bytes", "max_content_bytes"}) {
+    google::rpc::Status refusal = status(grpc::StatusCode::RESOURCE_EXHAUSTED, "no room");
+    google::rpc::QuotaFailure quota;
+    quota.add_violations()->set_subject(limit);
+    refusal.add_details()->PackFrom(quota);
+    EXPECT_EQ(to_error(refusal).code, ErrorCode::kFailedPrecondition) << limit;
+  }
+}
+
 TEST(StatusInWords, TakesAQuotaThatFreesUpForAServerThatIsBusy) {
   google::rpc::Status refusal = status(grpc::StatusCode::RESOURCE_EXHAUSTED, "the queue is full");
   refusal.add_details()->PackFrom(google::rpc::RetryInfo());

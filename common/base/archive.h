@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace radbake {
@@ -14,9 +15,38 @@ namespace radbake {
 //
 //   template <typename Archive> void keep(Archive& archive) { archive(count_); archive(values_); }
 
+/// Of whatever is kept between processes: raised when a layout changes, so that older bytes are known as such.
+inline constexpr std::uint32_t kArchiveLayout = 1;
+
+/// Counts the bytes that an ArchiveWriter would make.
+class ArchiveSize {
+ public:
+  template <typename Value>
+  requires std::is_trivially_copyable_v<Value>
+  void operator()(const Value&) { bytes_ += sizeof(Value); }
+  template <typename Value>
+  requires std::is_trivially_copyable_v<Value>
+  void operator()(const std::vector<Value>& values) { bytes_ += sizeof(std::uint64_t) + values.size() * sizeof(Value); }
+  void operator()(const std::string& text) { bytes_ += sizeof(std::uint64_t) + text.size(); }
+  template <typename Value>
+  void of_known_size(const std::vector<Value>& values) {
+    (*this)(values);
+  }
+  bool can_hold(std::uint64_t, std::size_t) const { return true; }
+
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  std::size_t bytes_ = 0;
+};
+
 /// Appends values to bytes.
 class ArchiveWriter {
  public:
+  ArchiveWriter() = default;
+  /// Room for so many bytes: they are never held twice while they grow.
+  explicit ArchiveWriter(std::size_t num_bytes) { bytes_.reserve(num_bytes); }
+
   template <typename Value>
   requires std::is_trivially_copyable_v<Value>
   void operator()(const Value& value) { put(&value, sizeof value); }

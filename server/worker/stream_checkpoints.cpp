@@ -35,7 +35,8 @@ std::optional<std::string> StreamCheckpoints::load(const std::string& name) {
   Result<std::string> bytes = inputs_.read(*found->second);
   // They decide the result as much as the scene does: look twice.
   if (!bytes.ok() || digest_of(*bytes) != *found->second) {
-    spdlog::warn("checkpoint '{}' is not as it was kept: that part is made again", name);
+    const std::string why = bytes.ok() ? "it is not as it was kept" : bytes.error().message;
+    spdlog::warn("checkpoint '{}' cannot be gone on from, that part is made again: {}", name, why);
     return std::nullopt;
   }
   spdlog::info("goes on from checkpoint '{}' of {} bytes", name, bytes->size());
@@ -43,6 +44,9 @@ std::optional<std::string> StreamCheckpoints::load(const std::string& name) {
 }
 
 void StreamCheckpoints::save(const std::string& name, const std::string& bytes) {
+  // Where there is no memory to send it, fail while nothing is sent: a blob that breaks off cannot be begun again.
+  constexpr std::uint64_t kChunksAtOnce = 16;
+  std::string(kChunksAtOnce * std::min<std::uint64_t>(chunk_bytes_, bytes.size()), '\0');
   // A server that is gone stops the bake by its token.
   (void)
       send_blob(name, BlobUse::kCheckpoint, std::as_bytes(std::span(bytes)), chunk_bytes_, stream_, [](std::uint64_t) {
@@ -57,6 +61,10 @@ void StreamCheckpoints::drop(const std::vector<std::string>& names) {
     report.mutable_drop_checkpoints()->add_names(name);
   }
   stream_.send(std::move(report));
+}
+
+void StreamCheckpoints::warn(const std::string& text) {
+  if (warnings_.insert(text).second) spdlog::warn("checkpoints: {}", text);
 }
 
 }  // namespace radbake::worker

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@ class StreamCheckpoints : public radiosity::Checkpoints {
   std::optional<std::string> load(const std::string& name) override;
   void save(const std::string& name, const std::string& bytes) override;
   void drop(const std::vector<std::string>& names) override;
+  /// Logs it: the same words once.
+  void warn(const std::string& text) override;
   double interval() const override { return interval_; }
 
  private:
@@ -29,6 +32,7 @@ class StreamCheckpoints : public radiosity::Checkpoints {
   const std::uint64_t chunk_bytes_;
   ReportStream& stream_;
   double interval_;
+  std::set<std::string> warnings_;
   std::map<std::string, std::optional<Digest>> kept_;  ///< no digest: by this attempt
 };
 

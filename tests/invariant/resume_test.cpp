@@ -1,10 +1,13 @@
 // Bakes that are stopped at any moment and go on from what they kept.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <new>
 
+#include "common/base/version.h"
 #include "server/radiosity/bake/row_checkpoint.h"
 #include "tests/invariant/bake_support.h"
 #include "tests/scenes/rooms.h"
@@ -14,6 +17,8 @@ namespace {
 
 using radiosity::BakeOptions;
 using radiosity::BakeOutcome;
+using testing::Contains;
+using testing::HasSubstr;
 
 /// Their number stands behind the block's format and fingerprint.
 std::uint64_t num_rows_of(const std::string& block) {
@@ -32,10 +37,12 @@ class MemoryCheckpoints final : public radiosity::Checkpoints {
   }
   std::optional<std::string> load(const std::string& name) override {
     const auto found = kept.find(name);
+    if (has_no_memory) throw std::bad_alloc();
     if (found == kept.end()) return std::nullopt;
     return found->second;
   }
   void save(const std::string& name, const std::string& bytes) override {
+    if (has_no_memory) throw std::bad_alloc();
     kept[name] = bytes;
     if (name == "pass") {
       ++num_passes_saved;
@@ -47,8 +54,12 @@ class MemoryCheckpoints final : public radiosity::Checkpoints {
   void drop(const std::vector<std::string>& names) override {
     for (const std::string& name : names) kept.erase(name);
   }
-  double interval() const override { return 0; }
+  void warn(const std::string& text) override { warnings.push_back(text); }
+  double interval() const override { return seconds; }
 
+  double seconds = 0;
+  bool has_no_memory = false;  ///< for what is kept
+  std::vector<std::string> warnings;
   std::map<std::string, std::string> kept;
   int num_saved = 0, num_passes_saved = 0, stop_after = 0;  ///< 0: never
   std::uint64_t num_rows_saved = 0;
@@ -162,6 +173,67 @@ TEST(Resume, MakesAgainWhatIsOfAnotherBakeOrBroken) {
   expect_same(whole, *bake_with(scene, options, half));
 }
 
+TEST(Resume, NeedsNoMemoryForWhatIsKept) {
+  const Scene scene = curtained_room();
+  const BakeOptions options{.atlas_size = 64, .max_patches = 200, .seed = 5, .max_error = 0.05};
+  const BakeOutcome whole = baked(scene, options);
+  MemoryCheckpoints kept;
+  (void)bake_with(scene, options, kept).ok();
+  MemoryCheckpoints none;
+  none.has_no_memory = true;
+  none.kept = kept.kept;
+  const auto outcome = bake_with(scene, options, none);
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message;
+  expect_same(whole, *outcome);
+  EXPECT_THAT(none.warnings, Contains(HasSubstr("no memory to recall the passes")));
+  EXPECT_THAT(none.warnings, Contains(HasSubstr("no memory to keep rows")));
+  EXPECT_THAT(none.warnings, Contains(HasSubstr("no memory to keep the passes")));
+}
+
+TEST(Resume, MakesAgainWhatAnotherEngineKept) {
+  const Scene scene = curtained_room();
+  const BakeOptions options{.atlas_size = 64, .max_patches = 200, .seed = 5, .max_error = 0.05};
+  MemoryCheckpoints older;
+  const BakeOutcome whole = *bake_with(scene, options, older);
+  std::string& pass = older.kept["pass"];
+  const std::size_t version = pass.find(kEngineVersion);
+  ASSERT_NE(version, std::string::npos);
+  pass[version] ^= 1;
+  MemoryCheckpoints found;
+  found.kept = {{"pass", pass}};
+  expect_same(whole, *bake_with(scene, options, found));
+  EXPECT_THAT(found.warnings, Contains(HasSubstr("another engine")));
+  EXPECT_EQ(found.num_passes_saved, older.num_passes_saved);
+}
+
+TEST(RowCheckpoint, WritesOverNoBlockWhereOneIsMissing) {
+  MemoryCheckpoints checkpoints;
+  std::vector<radiosity::TakenRow> rows(3);
+  const std::string last = radiosity::write_row_block(7, {1}, rows);
+  checkpoints.kept = {{"rows/1/0", "broken"}, {"rows/1/11", last}, {"rows/10/70", "of others"}};
+  radiosity::RowCheckpoint checkpoint(&checkpoints, "rows/1/", 7, rows);
+  EXPECT_TRUE(checkpoint.is_known(1));
+  checkpoint.add(2);
+  EXPECT_EQ(checkpoints.kept["rows/1/11"], last);
+  EXPECT_TRUE(checkpoints.kept.contains("rows/1/12"));
+  EXPECT_FALSE(checkpoints.kept.contains("rows/1/0"));
+}
+
+TEST(RowCheckpoint, KeepsLessOftenTheMoreBlocksThereAre) {
+  std::vector<radiosity::TakenRow> rows(3);
+  MemoryCheckpoints checkpoints;
+  checkpoints.seconds = 1e-9;
+  radiosity::RowCheckpoint few(&checkpoints, "rows/1/", 7, rows);
+  few.add(0);
+  EXPECT_EQ(checkpoints.num_saved, 1);
+  const std::string none = radiosity::write_row_block(7, {}, rows);
+  // A nanosecond, doubled by every eight of them: longer than a test.
+  for (int block = 1; block < 400; ++block) checkpoints.kept["rows/1/" + std::to_string(block)] = none;
+  radiosity::RowCheckpoint many(&checkpoints, "rows/1/", 7, rows);
+  many.add(1);
+  EXPECT_EQ(checkpoints.num_saved, 1);
+}
+
 TEST(RowBlock, ReadsBackWhatWasWrittenAndNothingElse) {
   std::vector<radiosity::TakenRow> rows(5);
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -184,10 +256,32 @@ TEST(RowBlock, ReadsBackWhatWasWrittenAndNothingElse) {
     EXPECT_FALSE(radiosity::read_row_block(bytes.substr(0, size), 7, rows.size()).ok()) << size;
   }
   EXPECT_FALSE(radiosity::read_row_block(bytes + '\0', 7, rows.size()).ok());
-  rows[4].row.entries = {{3, 1.0F}, {3, 1.0F}};
-  EXPECT_FALSE(radiosity::read_row_block(radiosity::write_row_block(7, {4}, rows), 7, rows.size()).ok());
-  rows[4].row.entries = {{3, std::nanf("")}};
-  EXPECT_FALSE(radiosity::read_row_block(radiosity::write_row_block(7, {4}, rows), 7, rows.size()).ok());
+}
+
+TEST(RowBlock, LeavesOutRowsThatNoSceneHas) {
+  std::vector<radiosity::TakenRow> rows(5);
+  rows[0].row.entries = {{3, 1.0F}, {3, 1.0F}};
+  rows[1].row.entries = {{3, std::nanf("")}};
+  rows[2].row.entries = {{1, 1.0F}, {3, 1.0F}};
+  rows[3].sample.reflectance = {1.5, 0.5, 0.5};
+  rows[4].row.counted = 16;
+  rows[4].row.absorbed = -1;
+  const auto read = radiosity::read_row_block(radiosity::write_row_block(7, {0, 1, 2, 3, 4}, rows), 7, rows.size());
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->patches, (std::vector<std::uint32_t>{2}));
+  EXPECT_EQ(read->num_refused, 4u);
+  EXPECT_EQ(read->rows[0].row.entries[1].patch, 3u);
+}
+
+TEST(RowBlock, TakesWhatRoundingLeavesOutsideTheLimits) {
+  std::vector<radiosity::TakenRow> rows(2);
+  // Half reflected, half passed on: of what does not pass, all is reflected.
+  rows[0].sample.reflectance = {1, 1, 1};
+  rows[1].row.counted = 65536;
+  rows[1].row.absorbed = -1e-12;
+  const auto read = radiosity::read_row_block(radiosity::write_row_block(7, {0, 1}, rows), 7, rows.size());
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->num_refused, 0u);
 }
 
 }  // namespace

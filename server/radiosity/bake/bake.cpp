@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <new>
 #include <optional>
 #include <string>
 
 #include "common/base/archive.h"
+#include "common/base/version.h"
+#include "server/radiosity/bake/keep_report.h"
 #include "server/radiosity/bake/lightmap_layers.h"
 #include "server/radiosity/bake/on_threads.h"
 #include "server/radiosity/bake/pass_runner.h"
@@ -22,36 +25,6 @@ namespace radbake::radiosity {
 namespace {
 
 Error cancelled() { return {ErrorCode::kCancelled, "the bake was cancelled"}; }
-
-/// What the passes have written into a report.
-template <typename Archive>
-void keep_report(Archive& archive, BakeReport& report) {
-  for (auto* count : {&report.num_patches, &report.num_row_rays, &report.num_gather_rays, &report.num_light_rays}) {
-    archive(*count);
-  }
-  SolverSummary& solver = report.solver;
-  archive(solver.solver);
-  archive(solver.status);
-  archive(solver.sweeps);
-  for (double* value : {&solver.residual, &solver.error_bound, &solver.relative_error_bound, &solver.tolerance}) {
-    archive(*value);
-  }
-  archive(solver.history);
-  archive(report.energy);
-  archive(report.transport);
-  archive(report.error.limited_by);
-  archive(report.error.predicted);
-  archive(report.passes);
-  auto num_warnings = static_cast<std::uint64_t>(report.warnings.size());
-  archive(num_warnings);
-  // Each has at least its two lengths.
-  if (!archive.can_hold(num_warnings, 2 * sizeof(std::uint64_t))) return;
-  report.warnings.resize(num_warnings);
-  for (Warning& warning : report.warnings) {
-    archive(warning.id);
-    archive(warning.text);
-  }
-}
 
 /// One bake, pass after pass, on the threads of the arena that it runs in.
 class Bake {
@@ -79,15 +52,27 @@ class Bake {
   /// Takes up the passes that an earlier attempt kept, where there are any. False: they do not fit, and this object is
   /// of no more use.
   bool resume() {
-    const std::optional<std::string> bytes = checkpoints_ != nullptr ? checkpoints_->load(kPassName) : std::nullopt;
-    if (!bytes) return true;
-    ArchiveReader archive(*bytes);
-    std::string theirs;
-    archive(theirs);
-    if (theirs != fingerprint()) return true;
+    if (checkpoints_ == nullptr) return true;
     double edge = prepared_.patch_edge;
-    keep(archive, edge);
-    if (!archive.is_at_end()) return false;
+    try {
+      const std::optional<std::string> bytes = checkpoints_->load(kPassName);
+      if (!bytes) return true;
+      ArchiveReader archive(*bytes);
+      std::string theirs;
+      archive(theirs);
+      if (theirs != fingerprint()) {
+        checkpoints_->warn("the kept passes are of another engine or bake: they are made again");
+        return true;
+      }
+      keep(archive, edge);
+      if (!archive.is_at_end()) {
+        checkpoints_->warn("the kept passes cannot be read: they are made again");
+        return false;
+      }
+    } catch (const std::bad_alloc&) {
+      checkpoints_->warn("no memory to recall the passes: they are made again");
+      return false;
+    }
     passes_.take_patches(edge, max_refined_patches());
     return true;
   }
@@ -269,9 +254,10 @@ class Bake {
     return {};
   }
 
-  /// Of what the passes depend on, for one scene, set of options and build.
+  /// Of what the passes depend on, for one scene and set of options.
   std::string fingerprint() const {
-    return "radpass01 " + outcome_.report.instruction_set + ' ' + std::to_string(num_first_patches_);
+    return std::string("radpass ") + kEngineVersion + ' ' + std::to_string(kArchiveLayout) + ' ' +
+           outcome_.report.instruction_set + ' ' + std::to_string(num_first_patches_);
   }
 
   /// Where the passes stand.
@@ -284,12 +270,23 @@ class Bake {
     passes_.keep(archive);
   }
 
-  void keep_pass() {
-    if (checkpoints_ == nullptr || progress_.seconds() - kept_at_ < checkpoints_->interval()) return;
-    ArchiveWriter archive;
+  template <typename Archive>
+  void keep_all(Archive& archive) {
     archive(fingerprint());
     keep(archive, prepared_.patch_edge);
-    checkpoints_->save(kPassName, archive.take());
+  }
+
+  void keep_pass() {
+    if (checkpoints_ == nullptr || progress_.seconds() - kept_at_ < checkpoints_->interval()) return;
+    try {
+      ArchiveSize size;
+      keep_all(size);
+      ArchiveWriter archive(size.bytes());
+      keep_all(archive);
+      checkpoints_->save(kPassName, archive.take());
+    } catch (const std::bad_alloc&) {
+      return checkpoints_->warn("no memory to keep the passes: another attempt makes them again");
+    }
     // The rows of this pass and of those before it have served.
     std::vector<std::string> names;
     for (std::string& name : checkpoints_->names()) {
@@ -390,7 +387,10 @@ Result<BakeOutcome> bake_scene(const Scene& scene, const BakeOptions& options, B
       prediction = predict_bake(*prepared, process_cpu_seconds() - start.cpu_seconds, stop);
     ProgressMeter progress(observer, start, options.max_error);
     auto bake = std::make_unique<Bake>(scene, *prepared, progress, stop, finish, checkpoints);
-    if (!bake->resume()) bake = std::make_unique<Bake>(scene, *prepared, progress, stop, finish, checkpoints);
+    if (!bake->resume()) {
+      bake.reset();  // there may be no room for two
+      bake = std::make_unique<Bake>(scene, *prepared, progress, stop, finish, checkpoints);
+    }
     auto outcome = bake->run();
     if (!outcome.ok()) return outcome;
     outcome->report.prediction = prediction;

@@ -20,6 +20,8 @@ class Checkpoints {
   /// In the place of what was kept under this name.
   virtual void save(const std::string& name, const std::string& bytes) = 0;
   virtual void drop(const std::vector<std::string>& names) = 0;
+  /// Tells a log what was not kept, or what of it does not serve, and why.
+  virtual void warn(const std::string& text) = 0;
   /// Seconds of work that may be lost: what is kept more often costs more than it saves.
   virtual double interval() const = 0;
 };

@@ -96,7 +96,8 @@ Result<std::vector<PatchLight>> PassRunner::solve_replicates(const Pass& pass, s
                              pass.tolerance,
                              checkpoints_,
                              rows_prefix(pass.index) + std::to_string(r) + '/'};
-    const auto on_row = [&](std::uint64_t done, std::uint64_t total) {
+    const auto on_row = [&](std::uint64_t done, std::uint64_t total, bool is_new) {
+      if (!is_new) progress_.recall_rows(1 / static_cast<double>(total * total_num));
       progress_.report(BakeStage::kFormFactors, total * index + done, total * total_num);
       if (!is_first && is_over_()) end.request_stop();
     };

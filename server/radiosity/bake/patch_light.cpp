@@ -87,14 +87,14 @@ Result<std::vector<Vec3>> solve_system(const BakePlan& plan, const RadiositySyst
 }  // namespace
 
 Result<ReplicateSystem> estimate_system(const Preparation& prepared, const SystemSettings& settings,
-                                        const std::function<void(std::uint64_t, std::uint64_t)>& on_row,
-                                        std::stop_token stop) {
+                                        const OnRow& on_row, std::stop_token stop) {
   const int num_channels = prepared.num_ray_channels();
   ReplicateSystem replicate;
   replicate.tolerance = settings.tolerance;
   for (int channel = 0; channel < num_channels; ++channel) {
-    const auto of_all = [&](std::uint64_t done, std::uint64_t total) {
-      on_row(total * static_cast<std::uint64_t>(channel) + done, total * static_cast<std::uint64_t>(num_channels));
+    const auto of_all = [&](std::uint64_t done, std::uint64_t total, bool is_new) {
+      on_row(total * static_cast<std::uint64_t>(channel) + done, total * static_cast<std::uint64_t>(num_channels),
+             is_new);
     };
     RADBAKE_ASSIGN_OR_RETURN(auto system, make_radiosity_system(prepared, settings, channel, of_all, stop));
     if (num_channels > 1) keep_channel(channel, *system);

@@ -36,10 +36,9 @@ struct ReplicateSystem {
   PatchLightReport report;
 };
 
-/// Estimates the rows of one replicate. on_row(done, total) as in sample_patches(). Errors: kCancelled.
+/// Estimates the rows of one replicate. on_row as in sample_patches(). Errors: kCancelled.
 Result<ReplicateSystem> estimate_system(const Preparation& prepared, const SystemSettings& settings,
-                                        const std::function<void(std::uint64_t, std::uint64_t)>& on_row,
-                                        std::stop_token stop);
+                                        const OnRow& on_row, std::stop_token stop);
 
 /// Solves it; the system is used up but for its report. on_step(steps, relative error bound) while the solver works.
 /// Errors: kCancelled; kInternal where the solver did not converge.

@@ -40,6 +40,11 @@ void ProgressMeter::begin_pass(int pass, double share_of_rest, double row_rays, 
   gather_share_ = (1 - kSolvingShare) * gather_rays / traced;
 }
 
+void ProgressMeter::recall_rows(double share) {
+  const std::scoped_lock lock(mutex_);
+  recalled_ += (pass_end_ - pass_begin_) * row_share_ * share;
+}
+
 void ProgressMeter::end_pass(double relative_error, double low, double high) {
   const std::scoped_lock lock(mutex_);
   progress_.relative_error = relative_error;
@@ -84,8 +89,9 @@ void ProgressMeter::report(BakeStage stage, std::uint64_t done, std::uint64_t to
   progress_.steps_total = total;
   progress_.residual = residual;
   constexpr double kEnoughToTell = 0.05;
-  if (progress_.fraction > kEnoughToTell) {
-    progress_.seconds_left = to_seconds(now - start_.wall) * (1 - progress_.fraction) / progress_.fraction;
+  const double worked = progress_.fraction - recalled_;
+  if (worked > kEnoughToTell) {
+    progress_.seconds_left = to_seconds(now - start_.wall) * (1 - progress_.fraction) / worked;
   }
   observer_.on_progress(progress_);
 }

@@ -29,6 +29,9 @@ class ProgressMeter {
   /// From any thread. Calls the observer at most about 20 times a second, and at the end of each stage. Stages of later
   /// passes are all told as kGathering: what the caller sees never goes back.
   void report(BakeStage stage, std::uint64_t done, std::uint64_t total, double residual = 0);
+  /// A share of the pass's rows was kept by an earlier attempt: what is done without work tells nothing of the time
+  /// left.
+  void recall_rows(double share);
   /// The map's error as the pass that ends leaves it.
   void end_pass(double relative_error, double low, double high);
   /// Calls the observer with a tile, apart from all other calls.
@@ -46,6 +49,7 @@ class ProgressMeter {
   Start start_;
   double pass_begin_ = 0, pass_end_ = 1;  ///< fractions
   double row_share_ = 0, gather_share_ = 0;
+  double recalled_ = 0;  ///< of the fraction
   BakeProgress progress_;
   BakeStage stage_ = BakeStage::kPreparing;
   Clock::time_point stage_start_;

@@ -6,6 +6,8 @@
 #include <sstream>
 #include <string>
 
+#include "common/base/archive.h"
+#include "common/base/version.h"
 #include "server/radiosity/bake/row_checkpoint.h"
 #include "server/radiosity/form_factor/adaptive.h"
 #include "server/radiosity/form_factor/analytic_rows.h"
@@ -207,19 +209,20 @@ std::unique_ptr<TransportOperator> make_streamed(const EstimatedRows& rows, cons
       std::move(sums), source, reads_columns(solver) ? StreamedSystem::kByColumns : StreamedSystem::kByRows);
 }
 
-/// Of all that the rows of a system depend on, for one scene, set of options and build.
+/// Of all that the rows of a system depend on, for one scene and set of options.
 std::uint64_t fingerprint_of(const Preparation& prepared, const SystemSettings& settings, int channel) {
   std::ostringstream text;
-  text << prepared.visibility->instruction_set() << ' ' << prepared.patches.size() << ' ' << prepared.patch_edge << ' '
-       << settings.seed << ' ' << settings.rays_per_row << ' ' << settings.light_samples << ' ' << channel;
+  text << kEngineVersion << ' ' << kArchiveLayout << ' ' << prepared.visibility->instruction_set() << ' '
+       << prepared.patches.size() << ' ' << prepared.patch_edge << ' ' << settings.seed << ' ' << settings.rays_per_row
+       << ' ' << settings.light_samples << ' ' << channel;
   return std::hash<std::string>{}(text.str());
 }
 
 }  // namespace
 
-Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
-    const Preparation& prepared, const SystemSettings& settings, int channel,
-    const std::function<void(std::uint64_t, std::uint64_t)>& on_row, std::stop_token stop) {
+Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(const Preparation& prepared,
+                                                               const SystemSettings& settings, int channel,
+                                                               const OnRow& on_row, std::stop_token stop) {
   const Surfaces& surfaces = prepared.surveyed.surfaces;
   const Patches& patches = prepared.patches;
   auto system = std::make_unique<RadiositySystem>();

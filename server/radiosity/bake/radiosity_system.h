@@ -55,8 +55,8 @@ std::unique_ptr<RowEstimator> make_row_estimator(const Preparation& prepared, in
 /// Without interreflection there are no rows and no operator, only E_in of each patch.
 /// on_row as in sample_patches(). A streamed operator stops estimating when `stop` is requested, later on too.
 /// Errors: kCancelled.
-Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(
-    const Preparation& prepared, const SystemSettings& settings, int channel,
-    const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row, std::stop_token stop);
+Result<std::unique_ptr<RadiositySystem>> make_radiosity_system(const Preparation& prepared,
+                                                               const SystemSettings& settings, int channel,
+                                                               const OnRow& on_row, std::stop_token stop);
 
 }  // namespace radbake::radiosity

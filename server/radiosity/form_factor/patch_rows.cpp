@@ -171,7 +171,7 @@ std::vector<std::uint8_t> find_reached_backs(const Surfaces& surfaces, const Pat
 
 void sample_patches(const PatchSampler& sampler, std::size_t num_fronts, std::span<const std::uint8_t> reached,
                     const std::function<void(std::uint32_t, FormFactorRow&, const PatchSample&)>& take,
-                    const std::function<void(std::uint64_t, std::uint64_t)>& on_row, const std::stop_token& stop,
+                    const OnRow& on_row, const std::stop_token& stop,
                     const std::function<const std::vector<FormFactorRow::Entry>*(std::uint32_t)>& known) {
   std::vector<std::atomic<std::uint8_t>> is_met(sampler.size());
   // First all fronts and the reached backs; then, wave by wave, the backs that the last wave's rows have met.
@@ -201,7 +201,7 @@ void sample_patches(const PatchSampler& sampler, std::size_t num_fronts, std::sp
         for (const FormFactorRow::Entry& entry : *entries) is_met[entry.patch].store(1, std::memory_order_relaxed);
         if (is_new) take(wave[k], row, sampler.sample_light(wave[k], scratch));
         const std::uint64_t now = ++done;
-        if (on_row) on_row(now, total);
+        if (on_row) on_row(now, total, is_new);
       }
     });
     if (stop.stop_requested()) return;

@@ -77,16 +77,17 @@ class PatchSampler {
 std::vector<std::uint8_t> find_reached_backs(const Surfaces& surfaces, const Patches& patches,
                                              const Visibility& visibility, const std::stop_token& stop);
 
+/// Of rows: done, and known to be needed; whether the one that was done last was sampled, or known before.
+using OnRow = std::function<void(std::uint64_t done, std::uint64_t total, bool is_new)>;
+
 /// Samples all front patches, the `reached` backs, and other back patches that rows reach, and hands each to `take`.
 ///
 /// take(patch, row, sample) is called from any thread, once a patch; it may move the entries out of the row. Patches
-/// that no row reaches are not sampled. on_row is called after each row, from any thread, with the number of rows done
-/// and known to be needed. Stopped early, some are missing. `known`, from any thread: the entries of a row that need
-/// not be sampled, or null; it is not taken.
+/// that no row reaches are not sampled. on_row is called after each row, from any thread. Stopped early, some are
+/// missing. `known`, from any thread: the entries of a row that need not be sampled, or null; it is not taken.
 void sample_patches(const PatchSampler& sampler, std::size_t num_fronts, std::span<const std::uint8_t> reached,
                     const std::function<void(std::uint32_t, FormFactorRow&, const PatchSample&)>& take,
-                    const std::function<void(std::uint64_t done, std::uint64_t total)>& on_row,
-                    const std::stop_token& stop,
+                    const OnRow& on_row, const std::stop_token& stop,
                     const std::function<const std::vector<FormFactorRow::Entry>*(std::uint32_t)>& known = {});
 
 }  // namespace radbake::radiosity

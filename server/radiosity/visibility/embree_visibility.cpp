@@ -48,6 +48,7 @@ class Tree {
   Tree(std::span<const Corners> triangles, const std::stop_token& stop, const Opacity* opacity) : opacity_(opacity) {
     device_.reset(rtcNewDevice(nullptr));
     check_memory(rtcGetDeviceError(device_.get()));
+    RADBAKE_CHECK(device_ != nullptr);
     scene_.reset(rtcNewScene(device_.get()));
     rtcSetSceneFlags(scene(), RTC_SCENE_FLAG_ROBUST);
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {

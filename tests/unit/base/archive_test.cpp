@@ -40,6 +40,13 @@ TEST(Archive, GivesBackWhatWasKept) {
   EXPECT_EQ(state.sized, (std::vector<float>{1, 2, 3}));
 }
 
+TEST(Archive, TellsHowManyBytesItWillMake) {
+  State state{7, "two words", {1.5, -2.5}, {1, 2, 3}};
+  ArchiveSize size;
+  state.keep(size);
+  EXPECT_EQ(size.bytes(), kept().size());
+}
+
 TEST(Archive, FailsAtEveryMissingByte) {
   const std::string bytes = kept();
   for (std::size_t size = 0; size < bytes.size(); ++size) {

@@ -16,9 +16,12 @@ using store::JobState;
 using store::StateChange;
 
 JobQueue::JobQueue(QueueOptions options, store::JobStore& jobs, store::TenantContent& content)
-    : options_(std::move(options)), store_(jobs), content_(content) {}
+    : options_(std::move(options)), store_(jobs), content_(content) {
+  content_.set_on_refusal([this](const Error& problem) { thread_.post([this, problem] { stand_still(problem); }); });
+}
 
 JobQueue::~JobQueue() {
+  content_.set_on_refusal({});
   drain();
   watchdog_ = {};
 }
@@ -127,7 +130,12 @@ Result<std::shared_ptr<Job>> JobQueue::accept_job(const store::NewJob& new_job) 
         ErrorCode::kResourceExhausted,
         std::to_string(num_waiting) + " bakes are waiting, max_queued_bakes is " + std::to_string(options_.max_queued)};
   }
-  RADBAKE_ASSIGN_OR_RETURN(const JobRecord record, store_.create(new_job));
+  const Result<JobRecord> created = store_.create(new_job);
+  if (!created.ok()) {
+    if (created.error().code != ErrorCode::kAlreadyExists) stand_still(created.error());
+    return created.error();
+  }
+  const JobRecord& record = *created;
   RADBAKE_ASSIGN_OR_RETURN(std::vector<store::JobEvent> events, store_.events_after(record.name, 0));
   const auto job = std::make_shared<Job>(record, std::move(events));
   add_live(job);

@@ -118,6 +118,12 @@ void ContentStore::end_upload(const Digest& digest, Upload& upload) {
   uploads_.erase(found);
 }
 
+void ContentStore::give_up_upload(const Digest& digest, Upload& upload, const Error& problem) {
+  end_upload(digest, upload);
+  const bool is_of_disk = problem.code == ErrorCode::kInternal || problem.code == ErrorCode::kResourceExhausted;
+  if (is_of_disk && on_refusal_) on_refusal_(problem);
+}
+
 Error ContentStore::upload_has_ended(const Digest& digest) const {
   return {ErrorCode::kUnavailable, "the upload of blob " + digest.sha256 + " ended: start it again"};
 }
@@ -133,7 +139,7 @@ Result<std::uint64_t> ContentStore::append_upload(const Digest& digest, std::uin
     return upload_has_ended(digest);
   }
   if (auto awake = wake_upload(digest, *upload); !awake.ok()) {
-    end_upload(digest, *upload);
+    give_up_upload(digest, *upload, awake.error());
     return awake.error();
   }
   const std::uint64_t committed = upload->writer->size();
@@ -150,7 +156,7 @@ Result<std::uint64_t> ContentStore::append_upload(const Digest& digest, std::uin
   }
   if (end <= committed) return committed;
   if (auto appended = upload->writer->append(bytes.subspan(committed - offset)); !appended.ok()) {
-    end_upload(digest, *upload);
+    give_up_upload(digest, *upload, appended.error());
     return appended.error();
   }
   upload->num_bytes = end;
@@ -168,7 +174,11 @@ Result<void> ContentStore::finish_upload(const Digest& digest) {
   }
   Result<void> committed = wake_upload(digest, *upload);
   if (committed.ok()) committed = commit(*upload->writer, digest);
-  end_upload(digest, *upload);
+  if (committed.ok()) {
+    end_upload(digest, *upload);
+  } else {
+    give_up_upload(digest, *upload, committed.error());
+  }
   return committed;
 }
 

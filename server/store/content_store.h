@@ -80,6 +80,8 @@ class ContentStore {
   std::uint64_t used_bytes() const;
   /// Called where an upload does not fit, with the bytes that are lacking; may sweep().
   void set_make_room(std::function<void(std::uint64_t bytes)> make_room) { make_room_ = std::move(make_room); }
+  /// Called where the disk refuses what an upload brings, from any thread; must be quick.
+  void set_on_refusal(std::function<void(const Error&)> on_refusal) { on_refusal_ = std::move(on_refusal); }
   /// Removes blobs that nobody needs and nobody has asked for since a time, the oldest first, until so many bytes are
   /// free; and uploads that have rested as long. Returns the bytes.
   Result<std::uint64_t> sweep(const std::set<Digest>& needed, std::chrono::system_clock::time_point unused_since,
@@ -114,10 +116,13 @@ class ContentStore {
   Result<void> wake_upload(const Digest& digest, Upload& upload);
   void end_upload(const Digest& digest, Upload& upload);
   Error upload_has_ended(const Digest& digest) const;
+  /// Ends it, and tells of a disk that refused. Precondition: as end_upload().
+  void give_up_upload(const Digest& digest, Upload& upload, const Error& problem);
 
   const std::filesystem::path folder_;
   const ContentLimits limits_;
   std::function<void(std::uint64_t)> make_room_;
+  std::function<void(const Error&)> on_refusal_;
   std::atomic<std::uint64_t> next_temporary_ = 0;
   mutable std::shared_mutex sweeping_;  // held alone while a blob is removed
   mutable std::mutex mutex_;            // guards what follows

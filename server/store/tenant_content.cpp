@@ -40,6 +40,10 @@ Result<ContentStore*> TenantContent::open_store(const std::string& tenant, Entry
       lock.unlock();
       if (make_room) make_room(tenant, *content, bytes);
     });
+    entry.store->set_on_refusal([this](const Error& problem) {
+      const std::lock_guard lock(mutex_);
+      if (on_refusal_) on_refusal_(problem);
+    });
     entry.opened = entry.store.get();
   }
   return entry.store.get();
@@ -59,6 +63,11 @@ void TenantContent::for_each(const std::function<void(const std::string&, Conten
 void TenantContent::set_make_room(std::function<void(const std::string&, ContentStore&, std::uint64_t)> room) {
   const std::lock_guard lock(mutex_);
   make_room_ = std::move(room);
+}
+
+void TenantContent::set_on_refusal(std::function<void(const Error&)> on_refusal) {
+  const std::lock_guard lock(mutex_);
+  on_refusal_ = std::move(on_refusal);
 }
 
 }  // namespace radbake::store

@@ -23,8 +23,9 @@ class TenantContent {
   Result<ContentStore*> of(const std::string& tenant);
   /// Those that are open.
   void for_each(const std::function<void(const std::string& tenant, ContentStore& content)>& visit);
-  /// As ContentStore's; for stores that are opened later, too. Empty: nobody makes room any more.
+  // As ContentStore's; for stores that are opened later, too. Empty: nobody listens any more.
   void set_make_room(std::function<void(const std::string& tenant, ContentStore& content, std::uint64_t bytes)> room);
+  void set_on_refusal(std::function<void(const Error&)> on_refusal);
 
  private:
   /// One that is being opened keeps only its own tenant waiting.
@@ -42,6 +43,7 @@ class TenantContent {
   std::mutex mutex_;  // guards what follows
   std::map<std::string, std::shared_ptr<Entry>> stores_;
   std::function<void(const std::string&, ContentStore&, std::uint64_t)> make_room_;
+  std::function<void(const Error&)> on_refusal_;
 };
 
 }  // namespace radbake::store

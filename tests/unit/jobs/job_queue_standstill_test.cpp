@@ -133,5 +133,24 @@ TEST_F(JobQueueTest, HoldsNoWorkerToBeSilentWhileItsResultGoesToTheDisk) {
   EXPECT_TRUE(wait_until([&] { return !run->kill_reason().empty(); }));  // but from now on
 }
 
+TEST_F(JobQueueTest, StandsStillWhereTheDiskTakesNoUploadAndNoJob) {
+  store::ContentStore& store = **content_->of("");
+  const std::string text = "a mesh";
+  const std::function<bool()> attempts[] = {
+      [&] { return store.append_upload(digest_of(text), 0, std::as_bytes(std::span(text))).ok(); },
+      [&] {
+        return queue_->submit({"a", "body", "label", "key", {}}).ok();
+      },
+  };
+  for (const auto& attempt : attempts) {
+    EXPECT_TRUE(wait_until([&] { return queue_->standstill().empty(); }));
+    const DatabaseOutage outage;
+    EXPECT_FALSE(attempt());
+    EXPECT_TRUE(wait_until([&] { return !queue_->standstill().empty(); }));
+  }
+  EXPECT_TRUE(wait_until([&] { return queue_->standstill().empty(); }));
+  for (const auto& attempt : attempts) EXPECT_TRUE(attempt());
+}
+
 }  // namespace
 }  // namespace radbake::jobs

@@ -260,6 +260,7 @@ class FakeWorker {
 }  // namespace radbake::testing
 
 int main(int argc, char** argv) {
+  signal(SIGSEGV, SIG_DFL);  // also where a sanitizer would report it
   using namespace radbake::testing;
   std::string program = argv[0];
   program = program.substr(program.rfind('/') + 1);

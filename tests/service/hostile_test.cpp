@@ -81,7 +81,9 @@ class HostileTest : public ::testing::Test {
     EXPECT_TRUE(client_.server->GetCapabilities(new_context().get(), {}, &capabilities).ok());
     const std::uint64_t peak = status_of(program_.pid(), "VmHWM") * 1024;
     RecordProperty("server_peak_mib", static_cast<int>(peak >> 20));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which keep what was freed
     EXPECT_LT(peak, kMostServerBytes);
+#endif
   }
 
   grpc::Status submit_manifest(const std::string& manifest, v1::Bake* bake = nullptr) {

@@ -29,6 +29,7 @@ struct ClientSecurity {
 struct ClientOptions {
   std::chrono::milliseconds first_delay{100};  ///< doubles from try to try
   std::chrono::milliseconds max_delay{5000};
+  std::chrono::milliseconds connect_limit{5000};     ///< for the handshakes of a connection
   std::chrono::milliseconds call_patience{3000};     ///< sum of the delays of one call
   std::chrono::milliseconds stream_patience{60000};  ///< sum of the delays without news on a transfer or a watch
   std::chrono::milliseconds call_deadline{30000};

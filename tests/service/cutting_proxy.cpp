@@ -31,8 +31,8 @@ int connect_to(const std::string& path) {
 }  // namespace
 
 CuttingProxy::CuttingProxy(const std::filesystem::path& folder, const std::string& server_socket,
-                           std::vector<std::uint64_t> cuts)
-    : socket_(folder / "proxy"), server_socket_(server_socket), cuts_(std::move(cuts)) {
+                           std::vector<std::uint64_t> cuts, std::chrono::milliseconds delay)
+    : socket_(folder / "proxy"), server_socket_(server_socket), cuts_(std::move(cuts)), delay_(delay) {
   listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const sockaddr_un address = address_of(socket_);
   RADBAKE_CHECK_EQ(::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
@@ -61,6 +61,7 @@ void CuttingProxy::accept_connections() {
 
 void CuttingProxy::carry(int client, int server) {
   char buffer[16 << 10];
+  std::this_thread::sleep_for(delay_);
   while (true) {
     pollfd ends[] = {{client, POLLIN, 0}, {server, POLLIN, 0}};
     if (::poll(ends, 2, -1) < 0) break;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <mutex>
@@ -16,7 +17,9 @@ namespace radbake::testing {
 class CuttingProxy {
  public:
   /// Listens on a Unix socket in `folder` and connects to that of a server. `cuts`: bytes between them; then none.
-  CuttingProxy(const std::filesystem::path& folder, const std::string& server_socket, std::vector<std::uint64_t> cuts);
+  /// `delay`: until the first byte of a connection is carried.
+  CuttingProxy(const std::filesystem::path& folder, const std::string& server_socket, std::vector<std::uint64_t> cuts,
+               std::chrono::milliseconds delay = {});
   ~CuttingProxy();
 
   std::string address() const { return "unix:" + socket_; }
@@ -30,6 +33,7 @@ class CuttingProxy {
 
   std::string socket_, server_socket_;
   std::vector<std::uint64_t> cuts_;
+  const std::chrono::milliseconds delay_;
   std::atomic<std::size_t> num_cuts_ = 0;
   std::atomic<std::uint64_t> since_cut_ = 0;
   int listener_ = -1;

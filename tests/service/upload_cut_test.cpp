@@ -73,5 +73,18 @@ TEST(UploadCut, GoesOnWhereItEndedAndSendsNoByteTwiceBeyondAChunk) {
   EXPECT_EQ(*client->download(digest), bytes);
 }
 
+TEST(UploadCut, ConnectsOverASlowWay) {
+  TemporaryFolder folder;
+  const service::BakeServerOptions options = TestServer::options_in(folder.path());
+  TestServer server(options);
+  // As handshakes take over far networks and on busy machines.
+  constexpr std::chrono::milliseconds kDelay{1500};
+  const CuttingProxy proxy(folder.path(), options.listen.substr(std::string("unix:").size()), {}, kDelay);
+  api::ClientOptions impatient;
+  impatient.call_patience = std::chrono::milliseconds(500);
+  const auto client = api::Client::connect(proxy.address(), impatient);
+  EXPECT_TRUE(client.ok()) << client.error().message;
+}
+
 }  // namespace
 }  // namespace radbake::testing

@@ -16,10 +16,9 @@ TaskPool::~TaskPool() {
 }
 
 void TaskPool::post(std::function<void()> task) {
-  {
-    const std::lock_guard lock(mutex_);
-    tasks_.push_back(std::move(task));
-  }
+  // Told under the lock: the task itself may let the pool be destroyed, as the end of the last worker does.
+  const std::lock_guard lock(mutex_);
+  tasks_.push_back(std::move(task));
   changed_.notify_one();
 }
 

@@ -16,7 +16,11 @@ class WorkersServiceTest : public ::testing::Test {
  protected:
   static service::BakeServerOptions options_in(const std::filesystem::path& folder, const std::string& program = "") {
     service::BakeServerOptions options = TestServer::options_in(folder, program);
+#if defined(__SANITIZE_THREAD__)  // under which a worker takes seconds to start
+    options.queue.worker.silence_limit = 10s;
+#else
     options.queue.worker.silence_limit = 1s;
+#endif
     options.queue.worker.cancel_grace = 200ms;
     options.queue.check_interval = 20ms;
     return options;

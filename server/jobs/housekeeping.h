@@ -30,8 +30,8 @@ class Housekeeping {
   Housekeeping(const HousekeepingOptions& options, store::JobStore& jobs, store::TenantContent& content);
   ~Housekeeping();
 
-  /// Frees at least so many bytes of a tenant's, if it can.
-  void make_room(const std::string& tenant, store::ContentStore& content, std::uint64_t bytes);
+  /// Frees at least so many bytes of a tenant's, if it can; how many it freed.
+  std::uint64_t make_room(const std::string& tenant, store::ContentStore& content, std::uint64_t bytes);
 
  private:
   void keep_house(const std::stop_token& stop);

@@ -1,4 +1,4 @@
-// What runs: workers are started for jobs and plans, and what becomes of them is recorded.
+// What runs: workers are started for jobs, and what becomes of all workers is recorded.
 
 #include <spdlog/spdlog.h>
 

@@ -2,7 +2,6 @@
 
 #include <sys/random.h>
 
-#include <chrono>
 #include <utility>
 
 #include "common/base/check.h"

@@ -150,15 +150,9 @@ def main():
             faults.append(f"the database: {whole}")
         if exit_code != 0:
             faults.append(f"the server ended with {exit_code}")
-        attempts = sum(seen.finished.attempt for seen in clients.histories if seen.finished)
-        print(f"{arguments.faults} times without the disk in {time.monotonic() - began:.0f} s")
-        print(f"{len(clients.histories)} bakes accepted, {attempts} attempts, {len(faults)} faults")
-        print("\n".join(sorted(server.refusals)))
-        for fault in faults:
-            print(fault)
-        if faults:
-            print((place / "log").read_text()[-20000:])
-        return 1 if faults else 0
+        return history.judge(place, clients, faults,
+                             f"{arguments.faults} times without the disk in {time.monotonic() - began:.0f} s",
+                             *sorted(server.refusals))
 
 
 if __name__ == "__main__":

@@ -174,6 +174,17 @@ def faults_of_store(content):
         yield f"{file.name} is left"
 
 
+def judge(place, clients, faults, *lines):
+    """Prints what was done, what came of it and what is wrong, with the log in `place`; the exit code."""
+    attempts = sum(seen.finished.attempt for seen in clients.histories if seen.finished)
+    print(f"{len(clients.histories)} bakes accepted, {attempts} attempts, {len(faults)} faults")
+    for line in [*lines, *faults]:
+        print(line)
+    if faults:
+        print((place / "log").read_text()[-20000:])
+    return 1 if faults else 0
+
+
 def faults_of_all(clients, expected, content):
     """Of every bake, and of the store."""
     yield from clients.failures

@@ -153,15 +153,9 @@ def main():
             faults.append("no worker went on from a checkpoint")
         faults += [f"no server came to {point}" for point in failpoints if arguments.kills >= ALL_POINTS * len(failpoints)
                    and kills[point] == 0]
-        attempts = sum(seen.finished.attempt for seen in clients.histories if seen.finished)
-        print(f"{sum(kills.values())} kills in {time.monotonic() - began:.0f} s: {dict(kills)}")
-        print(f"{len(clients.histories)} bakes accepted, {attempts} attempts, {num_resumed} checkpoints used, "
-              f"{len(faults)} faults")
-        for fault in faults:
-            print(fault)
-        if faults:
-            print((place / "log").read_text()[-20000:])
-        return 1 if faults else 0
+        return history.judge(place, clients, faults,
+                             f"{sum(kills.values())} kills in {time.monotonic() - began:.0f} s: {dict(kills)}",
+                             f"{num_resumed} checkpoints used")
 
 
 if __name__ == "__main__":
